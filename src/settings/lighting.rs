@@ -1,0 +1,111 @@
+//! How light crosses cloud.
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// The angular distribution of scattered light. Each integrates to 1 over the sphere.
+#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+pub enum PhaseFunction {
+    /// 1/4π: no direction is preferred.
+    Isotropic,
+    /// Henyey–Greenstein with asymmetry `g` (thesis, equation 3.11).
+    HenyeyGreenstein,
+    /// `(1 − lobe_mix)·HG(g) + lobe_mix·HG(g_back)`.
+    TwoLobe,
+    /// Jendersie & d'Eon's fit to Mie scattering from `droplet_diameter` (thesis, 3.13 to 3.17); the default.
+    #[default]
+    HgDraine,
+}
+
+/// Scattering, phase function and ambient light.
+///
+/// A resource; changes take effect in the next frame and never rebuild a pipeline.
+#[derive(Resource, Reflect, Serialize, Deserialize, Clone, PartialEq, Debug)]
+#[reflect(Resource, Default, Serialize, Deserialize, PartialEq)]
+#[serde(default, deny_unknown_fields)]
+pub struct CloudLighting {
+    /// Terms N of the multiple-scattering sum (thesis, 3.8): 1 is single scattering, 0 no sunlight. Each costs
+    /// one exponential a sample. Default 8.
+    #[reflect(@0..=16_u32)]
+    pub octaves: u32,
+    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.5.
+    #[reflect(@0.0..=1.0_f32)]
+    pub attenuation: f32,
+    /// b: factor on the contribution from one octave to the next; at most `attenuation` keeps energy
+    /// bounded. Default 0.5.
+    #[reflect(@0.0..=1.0_f32)]
+    pub contribution: f32,
+    /// c: factor on the phase function's asymmetry from one octave to the next (Wrenninge). Default 0.5.
+    #[reflect(@0.0..=1.0_f32)]
+    pub eccentricity: f32,
+    /// The phase function. Default [`PhaseFunction::HgDraine`].
+    pub phase: PhaseFunction,
+    /// Asymmetry of Henyey–Greenstein and of the forward lobe (−1 back, 1 forward). Default 0.8.
+    #[reflect(@-0.99..=0.99_f32)]
+    pub g: f32,
+    /// Asymmetry of the second lobe of [`PhaseFunction::TwoLobe`]. Default −0.3.
+    #[reflect(@-0.99..=0.99_f32)]
+    pub g_back: f32,
+    /// Share of the second lobe (0..1). Default 0.3.
+    #[reflect(@0.0..=1.0_f32)]
+    pub lobe_mix: f32,
+    /// Droplet diameter of [`PhaseFunction::HgDraine`] (µm). Default 12.
+    #[reflect(@5.0..=50.0_f32)]
+    pub droplet_diameter: f32,
+    /// Upper bound of a phase value (1/sr). The diffraction peak of real droplets reaches 10²…10⁴ within a
+    /// degree of the sun and would alias; what is cut there is lost (about a tenth of the peak's energy at 12
+    /// µm). Default 30.
+    #[reflect(@0.1..=100_000.0_f32)]
+    pub phase_limit: f32,
+    /// Factor on the sun's illuminance. Default 1: as the scene's light says.
+    #[reflect(@0.0..=100.0_f32)]
+    pub sun_strength: f32,
+    /// Factor on the ambient light (sky from above, ground from below). Default 1.
+    #[reflect(@0.0..=100.0_f32)]
+    pub ambient_strength: f32,
+    /// Tint of the ambient light, linear RGB. Default white.
+    #[reflect(@0.0..=10.0_f32)]
+    pub ambient_tint: Vec3,
+    /// Mean radiance of the sky where the scene has no `Atmosphere`, as a share of the sun's illuminance
+    /// (1/sr, linear RGB). Default (0.026, 0.037, 0.055): a clear day's.
+    #[reflect(@0.0..=1.0_f32)]
+    pub sky_fallback: Vec3,
+    /// Albedo of the ground below, linear RGB: its bounce lights the bases. Default (0.2, 0.2, 0.18).
+    #[reflect(@0.0..=1.0_f32)]
+    pub ground_albedo: Vec3,
+    /// Powder term `1 − e^(−2τ)` (Costa, 2.20), an artist's darkening of sunlit edges (0 off, 1 full). Default 0.
+    #[reflect(@0.0..=1.0_f32)]
+    pub powder: f32,
+    /// Amount of aerial perspective between camera and cloud, with Bevy's atmosphere only (0..1). Default 1.
+    #[reflect(@0.0..=1.0_f32)]
+    pub aerial_perspective: f32,
+    /// Where the blend with the background begins, as a share of `quality.max_distance`. Default 0.6.
+    #[reflect(@0.0..=1.0_f32)]
+    pub fade_start: f32,
+}
+
+impl Default for CloudLighting {
+    fn default() -> Self {
+        Self {
+            octaves: 8,
+            attenuation: 0.5,
+            contribution: 0.5,
+            eccentricity: 0.5,
+            phase: PhaseFunction::HgDraine,
+            g: 0.8,
+            g_back: -0.3,
+            lobe_mix: 0.3,
+            droplet_diameter: 12.0,
+            phase_limit: 30.0,
+            sun_strength: 1.0,
+            ambient_strength: 1.0,
+            ambient_tint: Vec3::ONE,
+            sky_fallback: Vec3::new(0.026, 0.037, 0.055),
+            ground_albedo: Vec3::new(0.2, 0.2, 0.18),
+            powder: 0.0,
+            aerial_perspective: 1.0,
+            fade_start: 0.6,
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! What a user sets. One file per resource; every field says meaning, unit, range, default and cost.
+
+mod check;
+mod lighting;
+mod model;
+mod paths;
+mod preset;
+mod quality;
+mod textures;
+mod view;
+
+use bevy::prelude::*;
+
+pub use check::{SettingsError, Validate};
+pub use lighting::{CloudLighting, PhaseFunction};
+pub use model::{CloudModel, Erosion};
+pub use paths::{CloudSettings, snake_case};
+pub use preset::{CloudPreset, PresetError};
+pub use quality::{CloudQuality, Integration, MarchResolution, TemporalMode};
+pub use textures::{CloudTextureSlots, CloudTextures};
+pub use view::{CloudClock, CloudView};
+
+/// The last good value of each setting: what the renderer sees. A bad change is reported once and ignored.
+#[derive(Resource, Clone, Debug, Default)]
+pub(crate) struct GoodSettings(pub CloudSettings);
+
+/// Settings resources, their types, checks and clock.
+pub(crate) struct CloudSettingsPlugin;
+
+impl Plugin for CloudSettingsPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<CloudModel>()
+            .init_resource::<CloudLighting>()
+            .init_resource::<CloudQuality>()
+            .init_resource::<CloudTextures>()
+            .init_resource::<CloudTextureSlots>()
+            .init_resource::<CloudClock>()
+            .init_resource::<GoodSettings>()
+            .register_type::<CloudModel>()
+            .register_type::<CloudLighting>()
+            .register_type::<CloudQuality>()
+            .register_type::<CloudTextures>()
+            .register_type::<CloudTextureSlots>()
+            .register_type::<CloudClock>()
+            .register_type::<CloudView>()
+            .register_type::<CloudPreset>()
+            .init_asset::<CloudPreset>()
+            .init_asset_loader::<preset::CloudPresetLoader>()
+            .add_systems(First, view::advance_clock.after(bevy::time::TimeSystems))
+            .add_systems(
+                Last,
+                (
+                    keep_good::<CloudModel>,
+                    keep_good::<CloudLighting>,
+                    keep_good::<CloudQuality>,
+                    keep_good::<CloudTextures>,
+                    keep_good::<CloudClock>,
+                )
+                    .chain(),
+            );
+    }
+}
+
+/// Settings that [`GoodSettings`] keeps a copy of.
+trait Kept: Resource + Validate + Clone {
+    fn slot(good: &mut CloudSettings) -> &mut Self;
+}
+
+macro_rules! kept {
+    ($($type:ty => $field:ident),* $(,)?) => {
+        $(impl Kept for $type {
+            fn slot(good: &mut CloudSettings) -> &mut Self { &mut good.$field }
+        })*
+    };
+}
+kept!(CloudModel => model, CloudLighting => lighting, CloudQuality => quality,
+      CloudTextures => textures, CloudClock => clock);
+
+fn keep_good<S: Kept>(setting: Option<Res<S>>, mut good: ResMut<GoodSettings>) {
+    let Some(setting) = setting.filter(|s| s.is_changed()) else { return };
+    match setting.validate() {
+        Ok(()) => S::slot(&mut good.0).clone_from(&setting),
+        Err(error) => error!("clouds: {error}; the last good value stays"),
+    }
+}

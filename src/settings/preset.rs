@@ -1,0 +1,148 @@
+//! Named skies, and skies from `.ron` files.
+
+use bevy::{
+    asset::{AssetLoader, LoadContext, io::Reader},
+    prelude::*,
+};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+use super::{CloudLighting, CloudModel, CloudTextures, SettingsError, Validate};
+
+/// A sky: what to put into [`CloudModel`], [`CloudLighting`] and [`CloudTextures`]. Quality is not part of it.
+///
+/// In a file (`*.clouds.ron`) every field that is left out keeps its default. It is also an asset.
+#[derive(Asset, Reflect, Serialize, Deserialize, Clone, PartialEq, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+#[serde(default, deny_unknown_fields)]
+pub struct CloudPreset {
+    /// Where cloud is.
+    pub model: CloudModel,
+    /// How light crosses it.
+    pub lighting: CloudLighting,
+    /// What the textures are baked from.
+    pub textures: CloudTextures,
+    /// Elevation of the sun this sky was made for (degrees). Advice: the plugin never moves your light.
+    pub sun_elevation: Option<f32>,
+}
+
+/// A preset that cannot be used.
+#[derive(Error, Debug)]
+pub enum PresetError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Io {
+        /// The file.
+        file: String,
+        /// Why.
+        source: std::io::Error,
+    },
+    /// The text is not a preset: unknown field, wrong type, or not RON at all; says line and column.
+    #[error("{file}:{source}")]
+    Parse {
+        /// The file.
+        file: String,
+        /// Where and why.
+        source: ron::error::SpannedError,
+    },
+    /// A field is out of its range.
+    #[error("{file}: {source}")]
+    Settings {
+        /// The file.
+        file: String,
+        /// Which and why.
+        source: SettingsError,
+    },
+}
+
+/// Names and texts of the presets that come with the crate.
+const BUILT_IN: [(&str, &str); 4] = [
+    ("ClearDay", include_str!("../../assets/presets/clear_day.clouds.ron")),
+    ("FairWeather", include_str!("../../assets/presets/fair_weather.clouds.ron")),
+    ("Overcast", include_str!("../../assets/presets/overcast.clouds.ron")),
+    ("Sunset", include_str!("../../assets/presets/sunset.clouds.ron")),
+];
+
+impl CloudPreset {
+    /// Names of the presets that come with the crate.
+    pub fn names() -> impl Iterator<Item = &'static str> {
+        BUILT_IN.iter().map(|(name, _)| *name)
+    }
+
+    /// The preset of this name (upper and lower case and `_` do not count), if there is one.
+    pub fn named(name: &str) -> Option<Self> {
+        let plain = |s: &str| s.replace(['_', '-', ' '], "").to_lowercase();
+        let (name, text) = BUILT_IN.iter().find(|(known, _)| plain(known) == plain(name))?;
+        // A test parses every built-in text, so this cannot fail for a user.
+        Self::parse(text, name).ok()
+    }
+
+    /// Parses and validates the text of a preset; `file` names it in errors.
+    ///
+    /// # Errors
+    /// [`PresetError::Parse`] with line and column, or [`PresetError::Settings`] with field and range.
+    pub fn parse(text: &str, file: &str) -> Result<Self, PresetError> {
+        let options = ron::Options::default()
+            .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+        let preset: Self = options
+            .from_str(text)
+            .map_err(|source| PresetError::Parse { file: file.to_owned(), source })?;
+        let named = |source| PresetError::Settings { file: file.to_owned(), source };
+        preset.model.validate().map_err(named)?;
+        preset.lighting.validate().map_err(named)?;
+        preset.textures.validate().map_err(named)?;
+        Ok(preset)
+    }
+
+    /// Reads a preset from a file.
+    ///
+    /// # Errors
+    /// [`PresetError::Io`], or as [`parse`](Self::parse).
+    pub fn read(path: &std::path::Path) -> Result<Self, PresetError> {
+        let file = path.display().to_string();
+        let text = std::fs::read_to_string(path)
+            .map_err(|source| PresetError::Io { file: file.clone(), source })?;
+        Self::parse(&text, &file)
+    }
+
+    /// The text of this preset, to be read by [`parse`](Self::parse).
+    pub fn to_ron(&self) -> String {
+        ron::ser::to_string_pretty(self, ron::ser::PrettyConfig::default()).unwrap_or_default()
+    }
+
+    /// Puts the preset into the world's settings.
+    pub fn apply(&self, world: &mut World) {
+        world.insert_resource(self.model.clone());
+        world.insert_resource(self.lighting.clone());
+        world.insert_resource(self.textures.clone());
+    }
+}
+
+/// Loads `*.clouds.ron` files as [`CloudPreset`] assets.
+#[derive(Default, TypePath)]
+pub(crate) struct CloudPresetLoader;
+
+impl AssetLoader for CloudPresetLoader {
+    type Asset = CloudPreset;
+    type Settings = ();
+    type Error = PresetError;
+
+    async fn load(
+        &self,
+        reader: &mut dyn Reader,
+        _settings: &(),
+        context: &mut LoadContext<'_>,
+    ) -> Result<CloudPreset, PresetError> {
+        let file = context.path().to_string();
+        let mut bytes = Vec::new();
+        reader
+            .read_to_end(&mut bytes)
+            .await
+            .map_err(|source| PresetError::Io { file: file.clone(), source })?;
+        CloudPreset::parse(&String::from_utf8_lossy(&bytes), &file)
+    }
+
+    fn extensions(&self) -> &[&str] {
+        &["clouds.ron"]
+    }
+}

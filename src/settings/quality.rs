@@ -1,0 +1,205 @@
+//! What a sky may cost: steps, resolution, temporal accumulation.
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+/// Size of the marched buffer against the view's.
+#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+pub enum MarchResolution {
+    /// One ray a pixel.
+    Full,
+    /// One ray for 2×2 pixels; the default.
+    #[default]
+    Half,
+    /// One ray for 4×4 pixels.
+    Quarter,
+}
+
+impl MarchResolution {
+    /// Pixels a marched texel spans along each axis: 1, 2 or 4.
+    pub fn divisor(self) -> u32 {
+        match self {
+            Self::Full => 1,
+            Self::Half => 2,
+            Self::Quarter => 4,
+        }
+    }
+}
+
+/// How frames are combined over time.
+#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+pub enum TemporalMode {
+    /// Every frame stands alone.
+    Off,
+    /// The thesis's unified TAA (4.5): the mean of the last `window` frames; restarts when the camera moves.
+    #[default]
+    SlidingWindow,
+}
+
+/// How one step of the march is integrated.
+#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+pub enum Integration {
+    /// Exact for a constant medium within the step, whatever its length (thesis, equation 8); the default.
+    #[default]
+    EnergyConserving,
+    /// `L·σs·Δ` weighted by the transmittance at the step's start: too bright for long steps. For comparison.
+    Naive,
+}
+
+/// Steps, thresholds, resolution and temporal mode.
+///
+/// A resource for all views; [`CloudView::quality`](super::CloudView::quality) overrides it for one. Start from
+/// [`low`](Self::low), [`medium`](Self::medium), [`high`](Self::high) (the default) or [`ultra`](Self::ultra).
+#[derive(Resource, Reflect, Serialize, Deserialize, Clone, PartialEq, Debug)]
+#[reflect(Resource, Default, Serialize, Deserialize, PartialEq)]
+#[serde(default, deny_unknown_fields)]
+pub struct CloudQuality {
+    /// Size of the marched buffer. Cost falls with its area. Default [`MarchResolution::Half`].
+    pub resolution: MarchResolution,
+    /// Length of a step inside cloud near the camera (m). Cost is inverse to it. Default 90.
+    #[reflect(@0.5..=5000.0_f32)]
+    pub step: f32,
+    /// Growth of the step with distance: a step is at least this share of the distance. Default 0.008.
+    #[reflect(@0.0..=0.2_f32)]
+    pub step_growth: f32,
+    /// Length of a step through empty air, in small steps (1 turns adaptive stepping off). Default 4.
+    #[reflect(@1..=16_u32)]
+    pub long_step: u32,
+    /// Empty small steps in a row after which the march returns to long ones. Default 6.
+    #[reflect(@1..=64_u32)]
+    pub empty_steps: u32,
+    /// Most steps a ray may take, long and small together. Default 512.
+    #[reflect(@1..=8192_u32)]
+    pub max_steps: u32,
+    /// Samples towards the sun for each lit sample (0: the sun is never shadowed). Cost is linear in it. Default 6.
+    #[reflect(@0..=64_u32)]
+    pub light_steps: u32,
+    /// Length of the first step towards the sun (m). Default 45.
+    #[reflect(@0.5..=5000.0_f32)]
+    pub light_step: f32,
+    /// Factor from one step towards the sun to the next: 1 is uniform. Default 1.7.
+    #[reflect(@1.0..=4.0_f32)]
+    pub light_growth: f32,
+    /// The march stops where transmittance falls to this (thesis: 0.075). Default 0.01.
+    #[reflect(@0.0..=0.9_f32)]
+    pub transmittance_stop: f32,
+    /// Samples whose density is below this are skipped (thesis: 0.01). Default 0.002.
+    #[reflect(@0.0..=0.9_f32)]
+    pub density_skip: f32,
+    /// Cut-off distance (m): nothing is marched beyond. Default 90 000.
+    #[reflect(@100.0..=2_000_000.0_f32)]
+    pub max_distance: f32,
+    /// Added to the mip level of all noise: above 0 is smoother and cheaper. Default 0.
+    #[reflect(@-4.0..=8.0_f32)]
+    pub lod_bias: f32,
+    /// How a step is integrated. Default [`Integration::EnergyConserving`].
+    pub integration: Integration,
+    /// Blue-noise and n-rooks offsets of pixel and depth samples (thesis 4.4): without them steps show as bands.
+    /// Default true.
+    pub offsets: bool,
+    /// How frames are combined. Default [`TemporalMode::SlidingWindow`].
+    pub temporal: TemporalMode,
+    /// Frames in the sliding window. Memory is linear in it, time is not. Default 8.
+    #[reflect(@1..=16_u32)]
+    pub window: u32,
+}
+
+impl Default for CloudQuality {
+    fn default() -> Self {
+        Self::high()
+    }
+}
+
+impl CloudQuality {
+    /// For weak GPUs: a quarter of the resolution, long steps, 40 km.
+    pub fn low() -> Self {
+        Self {
+            resolution: MarchResolution::Quarter,
+            step: 140.0,
+            step_growth: 0.014,
+            long_step: 4,
+            max_steps: 256,
+            light_steps: 4,
+            light_step: 60.0,
+            light_growth: 2.2,
+            max_distance: 50_000.0,
+            ..Self::high()
+        }
+    }
+
+    /// Between [`low`](Self::low) and [`high`](Self::high).
+    pub fn medium() -> Self {
+        Self {
+            step: 120.0,
+            step_growth: 0.012,
+            max_steps: 384,
+            light_steps: 5,
+            light_growth: 2.0,
+            max_distance: 70_000.0,
+            ..Self::high()
+        }
+    }
+
+    /// The default: half resolution, 8 frames, 90 km.
+    pub fn high() -> Self {
+        Self {
+            resolution: MarchResolution::Half,
+            step: 90.0,
+            step_growth: 0.008,
+            long_step: 4,
+            empty_steps: 6,
+            max_steps: 512,
+            light_steps: 6,
+            light_step: 45.0,
+            light_growth: 1.7,
+            transmittance_stop: 0.01,
+            density_skip: 0.002,
+            max_distance: 90_000.0,
+            lod_bias: 0.0,
+            integration: Integration::EnergyConserving,
+            offsets: true,
+            temporal: TemporalMode::SlidingWindow,
+            window: 8,
+        }
+    }
+
+    /// For stills and strong GPUs: every pixel, short steps, 16 frames, 150 km.
+    pub fn ultra() -> Self {
+        Self {
+            resolution: MarchResolution::Full,
+            step: 40.0,
+            step_growth: 0.004,
+            max_steps: 2048,
+            light_steps: 12,
+            light_step: 25.0,
+            light_growth: 1.35,
+            transmittance_stop: 0.005,
+            density_skip: 0.001,
+            max_distance: 150_000.0,
+            window: 16,
+            ..Self::high()
+        }
+    }
+
+    /// The preset of this name (`low`, `medium`, `high`, `ultra`), if there is one.
+    pub fn named(name: &str) -> Option<Self> {
+        Some(match name {
+            "low" => Self::low(),
+            "medium" => Self::medium(),
+            "high" => Self::high(),
+            "ultra" => Self::ultra(),
+            _ => return None,
+        })
+    }
+
+    /// Frames held: `window`, or 1 where [`TemporalMode::Off`].
+    pub fn held_frames(&self) -> u32 {
+        match self.temporal {
+            TemporalMode::Off => 1,
+            TemporalMode::SlidingWindow => self.window.clamp(1, 16),
+        }
+    }
+}

@@ -1,0 +1,55 @@
+//! What a camera carries, and the clock clouds move by.
+
+use bevy::prelude::*;
+use serde::{Deserialize, Serialize};
+
+use super::CloudQuality;
+
+/// Draws clouds in this camera's view. Opt-in, like `Bloom`; the camera needs a perspective projection.
+///
+/// Each camera has its own buffers and history. Removing it, or `enabled: false`, costs the GPU nothing.
+#[derive(Component, Reflect, Serialize, Deserialize, Clone, PartialEq, Debug)]
+#[reflect(Component, Default, Serialize, Deserialize, PartialEq)]
+#[serde(default, deny_unknown_fields)]
+#[require(bevy::camera::Hdr)]
+pub struct CloudView {
+    /// Whether clouds are drawn. Default true.
+    pub enabled: bool,
+    /// Quality of this view alone; `None` (the default) takes the [`CloudQuality`] resource.
+    pub quality: Option<CloudQuality>,
+    /// Change it (add 1) to drop the view's history, as on a camera cut. Default 0.
+    pub reset: u32,
+}
+
+impl Default for CloudView {
+    fn default() -> Self {
+        Self { enabled: true, quality: None, reset: 0 }
+    }
+}
+
+/// The clock that wind and evolution follow. The same time gives the same sky.
+#[derive(Resource, Reflect, Serialize, Deserialize, Clone, PartialEq, Debug)]
+#[reflect(Resource, Default, Serialize, Deserialize, PartialEq)]
+#[serde(default, deny_unknown_fields)]
+pub struct CloudClock {
+    /// Cloud time (s, f64). Default 0.
+    #[reflect(@-1.0e12..=1.0e12_f32)]
+    pub seconds: f64,
+    /// Cloud seconds per second of the app's virtual time; 0 pauses. Default 1.
+    #[reflect(@-1.0e4..=1.0e4_f32)]
+    pub speed: f32,
+}
+
+impl Default for CloudClock {
+    fn default() -> Self {
+        Self { seconds: 0.0, speed: 1.0 }
+    }
+}
+
+/// Advances [`CloudClock`] by the app's time.
+pub(crate) fn advance_clock(mut clock: ResMut<CloudClock>, time: Res<Time>) {
+    let step = time.delta_secs_f64() * f64::from(clock.speed);
+    if step != 0.0 && step.is_finite() {
+        clock.seconds += step;
+    }
+}
