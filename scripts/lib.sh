@@ -8,6 +8,10 @@ export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/bev
 # A binary that cargo did not start looks for assets/ beside itself unless told otherwise.
 export BEVY_ASSET_ROOT="${BEVY_ASSET_ROOT:-$repo_root}"
 
+# One feature set for all that the scripts build: with a second one, cargo would compile Bevy a second time.
+# shellcheck disable=SC2034 # used by both scripts
+features=(--features inspector)
+
 rust_bevy_declares=1.97.1 # what Bevy 0.20.1 asks for; it builds on less
 rust_minimum=1.95.0       # the oldest Rust that we test
 mesa_minimum=23           # 22.3.6, which is Debian 12's, crashes within a few frames
@@ -222,7 +226,9 @@ ensure_vulkan() {
     vulkan_usable && return
     local packages="your system's Vulkan loader and Mesa's Vulkan drivers, version $mesa_minimum or newer"
     case " $(os_release ID) $(os_release ID_LIKE) " in
-        *" debian "* | *" ubuntu "*) packages="libvulkan1 mesa-vulkan-drivers ($mesa_minimum or newer; on Debian 12 from bookworm-backports)" ;;
+        *" debian "* | *" ubuntu "*)
+            packages="libvulkan1 mesa-vulkan-drivers ($mesa_minimum or newer; on Debian 12 from bookworm-backports)"
+            ;;
         *" fedora "* | *" rhel "*) packages="vulkan-loader mesa-vulkan-drivers" ;;
         *" arch "*) packages="vulkan-icd-loader vulkan-swrast" ;;
     esac

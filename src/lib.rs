@@ -1,4 +1,132 @@
-//! Volumetric clouds for Bevy.
+//! Volumetric clouds for Bevy: one plugin, one component on a camera.
+//!
+//! ```no_run
+//! use bevy::prelude::*;
+//! use bevy_cumulus::prelude::*;
+//!
+//! fn main() {
+//!     App::new().add_plugins((DefaultPlugins, CloudsPlugin)).add_systems(Startup, setup).run();
+//! }
+//!
+//! fn setup(mut commands: Commands) {
+//!     commands.spawn((Camera3d::default(), CloudView::default()));
+//!     commands.spawn(DirectionalLight::default());
+//! }
+//! ```
+//!
+//! # A frame, top to bottom
+//! ```text
+//! settings (resources)  ->  textures (baked on the GPU or loaded as assets)  ->  model: "what is at p?"
+//!                                                                                  |  one shader interface
+//!    per camera:      sky light -> march -> accumulate -> composite   <------------+
+//!                     (after the opaque scene and sky, before tone mapping)
+//! ```
+//!
+//! | plugin | what it adds |
+//! |---|---|
+//! | settings | [`CloudModel`], [`CloudLighting`], [`CloudQuality`], [`CloudTextures`], [`CloudClock`]; checks; presets |
+//! | textures | noise volumes, cloud maps, blue noise; slots for your own |
+//! | model | the shader module that says where cloud is; [`ModelShader`] replaces it |
+//! | render | the passes of each camera with a [`CloudView`] |
+//!
+//! The plugin spawns nothing: the sun is the scene's brightest `DirectionalLight`, the sky its `Atmosphere`.
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
+
+mod model;
+pub mod reference;
+mod render;
 pub mod settings;
+pub mod textures;
+
+use bevy::{
+    prelude::*,
+    render::{
+        RenderApp,
+        render_resource::{DownlevelFlags, TextureFormat, TextureUsages},
+        renderer::{RenderAdapter, RenderDevice},
+    },
+};
+
+pub use model::ModelShader;
+pub use render::{CloudBuffer, CloudStatus};
+pub use settings::{
+    CloudClock, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
+    CloudTextures, CloudView,
+};
+
+/// What most users need.
+pub mod prelude {
+    pub use crate::{
+        CloudBuffer, CloudStatus, CloudsPlugin,
+        settings::{
+            CloudClock, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
+            CloudTextures, CloudView, Erosion, Integration, MarchResolution, PhaseFunction, TemporalMode,
+        },
+    };
+}
+
+/// Adds volumetric clouds to every camera with a [`CloudView`].
+///
+/// Add it after `DefaultPlugins`. On a device that cannot run compute shaders it warns once and draws nothing.
+pub struct CloudsPlugin;
+
+impl Plugin for CloudsPlugin {
+    fn build(&self, app: &mut App) {
+        app.add_plugins((
+            settings::CloudSettingsPlugin,
+            textures::CloudTexturesPlugin,
+            model::CloudModelPlugin,
+            render::CloudRenderPlugin,
+        ));
+    }
+
+    fn finish(&self, app: &mut App) {
+        let status = app.world().resource::<CloudStatus>().clone();
+        let Some(render_app) = app.get_sub_app_mut(RenderApp) else {
+            status.set_unsupported("there is no renderer (no RenderPlugin)".to_owned());
+            return;
+        };
+        if let Some(reason) = missing_capability(render_app.world()) {
+            warn!("clouds are off: {reason}");
+            status.set_unsupported(reason);
+            return;
+        }
+        render_app.insert_resource(render::StatusFlags(status.0.clone()));
+        textures::build_render(render_app);
+        render::build_render(render_app);
+    }
+}
+
+/// What the device lacks, with the adapter's name.
+fn missing_capability(world: &World) -> Option<String> {
+    let adapter = world.get_resource::<RenderAdapter>()?;
+    let device = world.get_resource::<RenderDevice>()?;
+    let name = adapter.get_info().name;
+    let flags = adapter.get_downlevel_capabilities().flags;
+    if !flags.contains(DownlevelFlags::COMPUTE_SHADERS) {
+        return Some(format!("{name} has no compute shaders"));
+    }
+    let limits = device.limits();
+    for (what, has, needs) in [
+        ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 2),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 1),
+        ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 128),
+        ("max_bind_groups", limits.max_bind_groups, 3),
+    ] {
+        if has < needs {
+            return Some(format!("{name}: {what} is {has}, and clouds need {needs}"));
+        }
+    }
+    for format in [
+        TextureFormat::Rgba8Unorm,
+        TextureFormat::Rgba16Float,
+        TextureFormat::Rgba32Float,
+        TextureFormat::Rg32Float,
+    ] {
+        if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {
+            return Some(format!("{name}: {format:?} cannot be a storage texture"));
+        }
+    }
+    None
+}

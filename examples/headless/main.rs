@@ -1,0 +1,96 @@
+//! Makes a picture of a sky without a window: `headless --scene ground_noon --out shot.png`.
+//!
+//! `options` says what is wanted, `shoot` renders it, `timings` measures it, `output` writes it.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod options;
+mod output;
+mod shim;
+mod shoot;
+mod status;
+mod timings;
+
+use std::{
+    io::Write as _,
+    panic::{AssertUnwindSafe, catch_unwind},
+    process::ExitCode,
+    sync::{Arc, Mutex},
+};
+
+use crate::shim::prelude::*;
+use anyhow::{Context as _, Result, anyhow, bail};
+use clap::Parser as _;
+use options::Options;
+
+fn main() -> ExitCode {
+    match run(&Options::parse()) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            // Nobody is left to tell where stderr is closed.
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            ExitCode::FAILURE
+        }
+    }
+}
+
+fn run(options: &Options) -> Result<()> {
+    let plan = options.plan()?;
+    if options.list {
+        list().context("--list")?;
+    }
+    let files = plan.files();
+    if files.is_empty() {
+        if options.list {
+            return Ok(());
+        }
+        bail!("nothing to do: give --out, --cloud, --timings or --list");
+    }
+    for (option, path, extension) in files {
+        output::check(path, extension).with_context(|| option.to_owned())?;
+    }
+    let shot = guarded(|| shoot::shoot(&plan))?;
+    output::write(&plan, &shot)
+}
+
+/// Runs `work` and makes an error of a panic in it: the engine panics where there is no GPU or its memory is full.
+fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+    let said = Arc::new(Mutex::new(None));
+    let hear = said.clone();
+    std::panic::set_hook(Box::new(move |info| {
+        let text = info
+            .payload_as_str()
+            .unwrap_or("no reason given")
+            .to_owned();
+        let place = info
+            .location()
+            .map_or_else(String::new, |at| format!(" ({}:{})", at.file(), at.line()));
+        if let Ok(mut said) = hear.lock() {
+            // The first one is the cause of those that follow.
+            said.get_or_insert(format!("{text}{place}"));
+        }
+    }));
+    let result = catch_unwind(AssertUnwindSafe(work));
+    drop(std::panic::take_hook());
+    result.unwrap_or_else(|_| {
+        let said = said.lock().ok().and_then(|mut said| said.take());
+        Err(anyhow!(
+            "the engine gave up: {}",
+            said.as_deref().unwrap_or("no reason given")
+        ))
+    })
+}
+
+/// Prints the names of scenes, presets and settable paths, one a line.
+fn list() -> std::io::Result<()> {
+    let scenes = common::SCENES.iter().map(|scene| scene.name.to_owned());
+    let presets = CloudPreset::names().map(str::to_owned);
+    let mut out = std::io::stdout().lock();
+    for name in scenes
+        .chain(presets)
+        .chain(CloudSettings::default().paths())
+    {
+        writeln!(out, "{name}")?;
+    }
+    out.flush()
+}

@@ -1,0 +1,264 @@
+//! The command line, and the plan it amounts to.
+
+use std::path::{Path, PathBuf};
+
+use crate::shim::prelude::*;
+use anyhow::{Context as _, Result, anyhow, bail};
+use bevy::math::Vec3;
+use clap::Parser;
+use serde_json::json;
+
+use crate::common::{CameraPose, PLAIN, SCENES, Scene, SunPose, exactly};
+
+/// Makes a picture of a sky without a window.
+///
+/// A scene sets defaults, every other option overrides them, and --set comes last.
+#[derive(Parser, Debug)]
+#[command(name = "headless", version)]
+pub struct Options {
+    /// Print the names of scenes, presets and settable paths, one a line
+    #[arg(long)]
+    pub list: bool,
+    /// What is in the picture, and from where it is seen
+    #[arg(long, value_name = "NAME")]
+    pub scene: Option<String>,
+    /// The sky: a built-in preset or a file
+    #[arg(long, value_name = "NAME|FILE.ron")]
+    pub preset: Option<String>,
+    /// What the sky may cost
+    #[arg(long, value_parser = ["low", "medium", "high", "ultra"])]
+    pub quality: Option<String>,
+    /// Size of the picture in pixels, each side from 1 to 8192
+    #[arg(long, value_name = "WxH", default_value = "480x270", value_parser = size)]
+    pub size: (u32, u32),
+    /// Frames rendered; the last one is kept
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
+    pub frames: u32,
+    /// Metres and degrees; y is the altitude, yaw 0 looks along −Z and turns right, fov is vertical (60)
+    #[arg(long, value_name = "X,Y,Z,YAW,PITCH[,FOV]", allow_hyphen_values = true)]
+    pub camera: Option<CameraPose>,
+    /// Added to the camera before every frame but the first, along the world's axes
+    #[arg(long = "move", value_name = "DX,DY,DZ,DYAW,DPITCH", allow_hyphen_values = true,
+          value_parser = |text: &str| exactly::<5>(text, "dx,dy,dz,dyaw,dpitch"))]
+    pub travel: Option<[f32; 5]>,
+    /// Degrees; the azimuth is counted as yaw is
+    #[arg(long, value_name = "ELEVATION,AZIMUTH", allow_hyphen_values = true)]
+    pub sun: Option<SunPose>,
+    /// Added to the sun before every frame but the first
+    #[arg(long, value_name = "DELEV,DAZIM", allow_hyphen_values = true,
+          value_parser = |text: &str| exactly::<2>(text, "delev,dazim"))]
+    pub sun_move: Option<[f32; 2]>,
+    /// The cloud clock at the first frame (s)
+    #[arg(long, value_name = "T", allow_hyphen_values = true, value_parser = finite)]
+    pub time: Option<f64>,
+    /// Added to the cloud clock before every frame but the first (s)
+    #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, default_value_t = 0.0, value_parser = finite)]
+    pub dt: f64,
+    /// Any setting by its path (see --list); may be repeated
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    pub sets: Vec<String>,
+    /// No atmosphere: black behind the clouds
+    #[arg(long)]
+    pub no_sky: bool,
+    /// Exposure of the camera (EV100); by default it follows the sun's elevation
+    #[arg(long, value_name = "EV100", allow_hyphen_values = true, value_parser = ev100)]
+    pub ev: Option<f32>,
+    /// Samples of multisample anti-aliasing
+    #[arg(long, default_value = "1", value_parser = ["1", "4"])]
+    pub msaa: String,
+    /// Write the picture as shown
+    #[arg(long, value_name = "SHOT.png")]
+    pub out: Option<PathBuf>,
+    /// Write the cloud buffer: radiance (cd/m²) and transmittance, 32-bit float
+    #[arg(long, value_name = "CLOUD.exr")]
+    pub cloud: Option<PathBuf>,
+    /// Write what each pass and the whole frame took (ms)
+    #[arg(long, value_name = "T.json")]
+    pub timings: Option<PathBuf>,
+}
+
+fn size(text: &str) -> Result<(u32, u32), String> {
+    let side = |part: &str| part.parse().ok().filter(|n| (1..=8192).contains(n));
+    let sides = text
+        .split_once('x')
+        .and_then(|(w, h)| Some((side(w)?, side(h)?)));
+    sides.ok_or_else(|| "expected WxH, such as 480x270, with sides from 1 to 8192".to_owned())
+}
+
+fn finite(text: &str) -> Result<f64, String> {
+    let number = text.trim().parse().ok().filter(|n: &f64| n.is_finite());
+    number.ok_or_else(|| "expected a finite number".to_owned())
+}
+
+fn ev100(text: &str) -> Result<f32, String> {
+    let number = finite(text).ok().filter(|n| (-10.0..=30.0).contains(n));
+    number
+        .map(|n| n as f32)
+        .ok_or_else(|| "expected a number from -10 to 30".to_owned())
+}
+
+/// What is to be rendered, with every default filled in and every value checked.
+pub struct Plan {
+    pub scene: Option<Scene>,
+    pub preset: String,
+    pub settings: CloudSettings,
+    pub size: (u32, u32),
+    pub frames: u32,
+    pub sky: bool,
+    pub msaa: u32,
+    pub ev100: f32,
+    pub out: Option<PathBuf>,
+    pub cloud: Option<PathBuf>,
+    pub timings: Option<PathBuf>,
+    camera: CameraPose,
+    travel: [f32; 5],
+    sun: SunPose,
+    sun_move: [f32; 2],
+    dt: f64,
+}
+
+impl Options {
+    /// Fills in the defaults and checks the rest.
+    pub fn plan(&self) -> Result<Plan> {
+        let scene = self.scene.as_deref().map(find_scene).transpose()?;
+        let base = scene.unwrap_or(PLAIN);
+        let preset_name = self.preset.as_deref().unwrap_or(base.preset);
+        let preset = find_preset(preset_name)?;
+        // A scene has its sun; where there is none, the preset's advice is taken.
+        let advised = preset.sun_elevation.filter(|_| scene.is_none());
+        let elevation = advised.unwrap_or(base.sun.elevation);
+        let sun = self.sun.unwrap_or(SunPose {
+            elevation,
+            ..base.sun
+        });
+        Ok(Plan {
+            settings: self.settings(preset)?,
+            preset: preset_name.to_owned(),
+            size: self.size,
+            frames: self.frames,
+            sky: !self.no_sky,
+            msaa: if self.msaa == "4" { 4 } else { 1 },
+            ev100: self.ev.unwrap_or(sun.ev100() + base.ev_offset),
+            out: self.out.clone(),
+            cloud: self.cloud.clone(),
+            timings: self.timings.clone(),
+            camera: self.camera.unwrap_or(base.camera),
+            travel: self.travel.unwrap_or_default(),
+            sun,
+            sun_move: self.sun_move.unwrap_or_default(),
+            dt: self.dt,
+            scene,
+        })
+    }
+
+    fn settings(&self, preset: CloudPreset) -> Result<CloudSettings> {
+        let mut settings = CloudSettings {
+            model: preset.model,
+            lighting: preset.lighting,
+            textures: preset.textures,
+            ..Default::default()
+        };
+        if let Some(quality) = self.quality.as_deref().and_then(CloudQuality::named) {
+            settings.quality = quality;
+        }
+        // Runs must repeat, so real time does not move the clouds.
+        settings.clock.speed = 0.0;
+        settings.clock.seconds = self.time.unwrap_or(0.0);
+        settings.validate().context("--time")?;
+        for text in &self.sets {
+            let (path, value) = text.split_once('=').ok_or_else(|| {
+                anyhow!("--set {text}: expected PATH=VALUE, such as model.coverage=0.2")
+            })?;
+            settings
+                .set(path.trim(), value)
+                .with_context(|| format!("--set {text}"))?;
+        }
+        settings.validate().context("--set")?;
+        Ok(settings)
+    }
+}
+
+fn find_scene(name: &str) -> Result<Scene> {
+    Scene::named(name).ok_or_else(|| {
+        let known = SCENES.map(|scene| scene.name).join(", ");
+        anyhow!("--scene {name:?}: no such scene; there are {known}")
+    })
+}
+
+fn find_preset(name: &str) -> Result<CloudPreset> {
+    if let Some(preset) = CloudPreset::named(name) {
+        return Ok(preset);
+    }
+    let path = Path::new(name);
+    if path.extension().is_some_and(|extension| extension == "ron") || path.is_file() {
+        return CloudPreset::read(path).context("--preset");
+    }
+    let known = CloudPreset::names().collect::<Vec<_>>().join(", ");
+    bail!("--preset {name:?}: no such preset; there are {known}, or give a .ron file")
+}
+
+impl Plan {
+    /// Seconds of virtual time a frame takes.
+    pub const FRAME_SECONDS: f64 = 1.0 / 60.0;
+
+    /// The camera of the counted frame `k`, from 0.
+    pub fn camera(&self, k: u32) -> CameraPose {
+        let [dx, dy, dz, yaw, pitch] = self.travel.map(|d| d * k as f32);
+        CameraPose {
+            position: self.camera.position + Vec3::new(dx, dy, dz),
+            yaw: self.camera.yaw + yaw,
+            pitch: self.camera.pitch + pitch,
+            fov: self.camera.fov,
+        }
+    }
+
+    /// The sun of the counted frame `k`, from 0.
+    pub fn sun(&self, k: u32) -> SunPose {
+        let [elevation, azimuth] = self.sun_move.map(|d| d * k as f32);
+        SunPose {
+            elevation: self.sun.elevation + elevation,
+            azimuth: self.sun.azimuth + azimuth,
+        }
+    }
+
+    /// The cloud clock of the counted frame `k`, from 0 (s).
+    pub fn seconds(&self, k: u32) -> f64 {
+        let clock = &self.settings.clock;
+        clock.seconds + f64::from(k) * (self.dt + f64::from(clock.speed) * Self::FRAME_SECONDS)
+    }
+
+    /// The files asked for: option, path and extension.
+    pub fn files(&self) -> Vec<(&'static str, &Path, &'static str)> {
+        let all = [
+            ("--out", &self.out, "png"),
+            ("--cloud", &self.cloud, "exr"),
+            ("--timings", &self.timings, "json"),
+        ];
+        all.into_iter()
+            .filter_map(|(option, path, kind)| Some((option, path.as_deref()?, kind)))
+            .collect()
+    }
+
+    /// Everything that decides the picture, for the timings file.
+    pub fn to_json(&self) -> serde_json::Value {
+        let pose = |c: &CameraPose| json!({ "position": c.position.to_array(), "yaw": c.yaw, "pitch": c.pitch, "fov": c.fov });
+        json!({
+            "model": self.settings.model,
+            "lighting": self.settings.lighting,
+            "quality": self.settings.quality,
+            "textures": self.settings.textures,
+            "clock": self.settings.clock,
+            "camera": pose(&self.camera),
+            "move": self.travel,
+            "sun": { "elevation": self.sun.elevation, "azimuth": self.sun.azimuth },
+            "sun_move": self.sun_move,
+            "dt": self.dt,
+            "frames": self.frames,
+            "sky": self.sky,
+            "msaa": self.msaa,
+            "ev100": self.ev100,
+            "scene": self.scene.map(|scene| scene.name),
+            "preset": self.preset,
+        })
+    }
+}

@@ -1,0 +1,111 @@
+//! Checks and writes the files.
+
+use std::{
+    fs::{self, OpenOptions},
+    io::Cursor,
+    path::Path,
+};
+
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
+use image::{DynamicImage, ImageFormat, Rgba32FImage};
+use serde_json::json;
+
+use crate::{options::Plan, shoot::Shot};
+
+/// Says before the work whether the file can be written after it.
+pub fn check(path: &Path, extension: &str) -> Result<()> {
+    let shown = path.display();
+    ensure!(
+        !path.as_os_str().is_empty(),
+        "the name of the file is empty"
+    );
+    ensure!(!path.is_dir(), "{shown} is a directory");
+    if let Some(found) = path.extension() {
+        ensure!(
+            found.eq_ignore_ascii_case(extension),
+            "{shown}: the file is a .{extension}, so its name must end so"
+        );
+    }
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty());
+    if let Some(folder) = folder {
+        ensure!(
+            folder.is_dir(),
+            "{shown}: there is no directory {}",
+            folder.display()
+        );
+    }
+    let existed = path.exists();
+    OpenOptions::new()
+        .append(true)
+        .create(true)
+        .open(path)
+        .with_context(|| format!("cannot write {shown}"))?;
+    if !existed {
+        fs::remove_file(path).with_context(|| format!("cannot write {shown}"))?;
+    }
+    Ok(())
+}
+
+/// Writes all that was asked for; then says whether it holds what it should.
+pub fn write(plan: &Plan, shot: &Shot) -> Result<()> {
+    if let Some(path) = &plan.out {
+        let picture = shot
+            .picture
+            .as_ref()
+            .ok_or_else(|| anyhow!("--out: no picture came back"))?;
+        put(
+            path,
+            &encode(&DynamicImage::ImageRgb8(picture.clone()), ImageFormat::Png)?,
+        )?;
+    }
+    let cloud = shot.cloud.as_ref();
+    if let Some(path) = &plan.cloud {
+        let cloud = cloud.ok_or_else(|| anyhow!("--cloud: no cloud buffer came back"))?;
+        put(
+            path,
+            &encode(
+                &DynamicImage::ImageRgba32F(cloud.clone()),
+                ImageFormat::OpenExr,
+            )?,
+        )?;
+    }
+    if let Some(path) = &plan.timings {
+        let (passes, frame) = shot.timings.to_json();
+        let all = json!({
+            "adapter": shot.adapter,
+            "size": [plan.size.0, plan.size.1],
+            "settings": plan.to_json(),
+            "passes": passes,
+            "frame": frame,
+        });
+        put(path, serde_json::to_string_pretty(&all)?.as_bytes())?;
+    }
+    cloud.map_or(Ok(()), finite)
+}
+
+fn encode(image: &DynamicImage, format: ImageFormat) -> Result<Vec<u8>> {
+    let mut bytes = Cursor::new(Vec::new());
+    image
+        .write_to(&mut bytes, format)
+        .with_context(|| format!("cannot encode {format:?}"))?;
+    Ok(bytes.into_inner())
+}
+
+fn put(path: &Path, bytes: &[u8]) -> Result<()> {
+    fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
+}
+
+/// An 8-bit picture hides NaN, so the cloud buffer behind it is looked at.
+fn finite(cloud: &Rgba32FImage) -> Result<()> {
+    let bad = |p: &image::Rgba<f32>| p.0.iter().any(|v| !v.is_finite());
+    let count = cloud.pixels().filter(|p| bad(p)).count();
+    if let Some((x, y, pixel)) = cloud.enumerate_pixels().find(|(_, _, p)| bad(p)) {
+        bail!(
+            "the cloud buffer is not finite in {count} pixels, the first at {x},{y}: {:?}",
+            pixel.0
+        );
+    }
+    Ok(())
+}

@@ -1,0 +1,366 @@
+//! Renders the plan's frames in lock-step, without a window, and reads the last one back.
+
+use std::time::{Duration, Instant};
+
+use crate::shim::{CloudBuffer, CloudStatus, prelude::*, textures::CloudTextureStatus};
+use anyhow::{Result, anyhow, bail, ensure};
+use bevy::{
+    camera::RenderTarget,
+    diagnostic::DiagnosticsStore,
+    log::{Level, LogPlugin},
+    prelude::*,
+    render::{
+        RenderApp, RenderPlugin,
+        diagnostic::RenderDiagnosticsPlugin,
+        gpu_readback::{Readback, ReadbackComplete},
+        pipelined_rendering::PipelinedRenderingPlugin,
+        render_resource::{CachedPipelineState, PipelineCache, PollType, TextureFormat},
+        renderer::{RenderAdapterInfo, RenderDevice},
+        settings::{WgpuFeatures, WgpuSettings},
+        view::screenshot::{Screenshot, ScreenshotCaptured},
+    },
+    time::TimeUpdateStrategy,
+    window::ExitCondition,
+    winit::WinitPlugin,
+};
+use image::{RgbImage, Rgba32FImage};
+
+use crate::{
+    common,
+    options::Plan,
+    status::Stage,
+    timings::{LAG, Timings},
+};
+
+/// How long the first usable frame may take to come, and the last one to come back.
+const READY_WITHIN: Duration = Duration::from_secs(300);
+const BACK_WITHIN: Duration = Duration::from_secs(120);
+/// Frames rendered after everything is ready and before the first that counts.
+const SETTLING_FRAMES: u32 = 4;
+
+/// What came out.
+pub struct Shot {
+    pub picture: Option<RgbImage>,
+    pub cloud: Option<Rgba32FImage>,
+    pub timings: Timings,
+    pub adapter: String,
+}
+
+/// What came back from the GPU so far.
+#[derive(Resource, Default)]
+struct Caught {
+    picture: Option<Image>,
+    cloud: Option<Vec<u8>>,
+}
+
+/// Renders the plan.
+pub fn shoot(plan: &Plan) -> Result<Shot> {
+    let mut studio = Studio::build(plan)?;
+    studio.make_ready(plan)?;
+    let timings = studio.count_frames(plan)?;
+    studio.shot(plan, timings)
+}
+
+struct Studio {
+    app: App,
+    camera: Entity,
+    sun: Entity,
+    target: Handle<Image>,
+    /// Absent where only timings are wanted, so that it costs them nothing.
+    buffer: Option<Handle<Image>>,
+}
+
+fn engine(plan: &Plan) -> App {
+    let mut gpu = WgpuSettings::default();
+    if plan.sky {
+        // Bevy's atmosphere filters Rgba32Float, which `WGPU_SETTINGS_PRIO=webgpu` would not ask for.
+        gpu.features |= WgpuFeatures::FLOAT32_FILTERABLE;
+    }
+    let mut app = App::new();
+    app.add_plugins(
+        DefaultPlugins
+            .set(LogPlugin {
+                level: Level::WARN,
+                // That rendering in software is slow goes without saying here.
+                filter: "wgpu=error,naga=error,bevy_render::renderer=error".into(),
+                ..default()
+            })
+            .set(WindowPlugin {
+                primary_window: None,
+                exit_condition: ExitCondition::DontExit,
+                ..default()
+            })
+            .set(RenderPlugin {
+                render_creation: gpu.into(),
+                synchronous_pipeline_compilation: true,
+                ..default()
+            })
+            .disable::<bevy::app::PanicHandlerPlugin>()
+            .disable::<WinitPlugin>()
+            .disable::<PipelinedRenderingPlugin>(),
+    )
+    .add_plugins((RenderDiagnosticsPlugin, CloudsPlugin))
+    .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(
+        Plan::FRAME_SECONDS,
+    )))
+    .init_resource::<Caught>();
+    app.finish();
+    app.cleanup();
+    app
+}
+
+impl Studio {
+    fn build(plan: &Plan) -> Result<Self> {
+        let mut app = engine(plan);
+        let world = app.world_mut();
+        let settings = plan.settings.clone();
+        world.insert_resource(settings.model);
+        world.insert_resource(settings.lighting);
+        world.insert_resource(settings.quality);
+        world.insert_resource(settings.textures);
+        // The clock is set before every frame instead, so it has no speed of its own.
+        world.insert_resource(CloudClock {
+            speed: 0.0,
+            ..settings.clock
+        });
+
+        let (width, height) = plan.size;
+        let limit = world
+            .resource::<RenderDevice>()
+            .limits()
+            .max_texture_dimension_2d;
+        ensure!(
+            width.max(height) <= limit,
+            "--size {width}x{height}: this device makes at most {limit} pixels a side"
+        );
+        let hills = plan.scene.is_some_and(|scene| scene.hills);
+        common::spawn_land(world, hills);
+        let sun = common::spawn_sky(world, plan.sun(0), plan.sky, hills);
+
+        let mut images = world.resource_mut::<Assets<Image>>();
+        let target = images.add(Image::new_target_texture(
+            width,
+            height,
+            TextureFormat::Rgba8UnormSrgb,
+            None,
+        ));
+        let wanted = plan.out.is_some() || plan.cloud.is_some();
+        let buffer = wanted.then(|| images.add(CloudBuffer::image(width, height)));
+        let camera = world
+            .spawn((
+                common::camera(plan.ev100),
+                CloudView::default(),
+                RenderTarget::from(target.clone()),
+            ))
+            .insert(if plan.msaa == 4 {
+                Msaa::Sample4
+            } else {
+                Msaa::Off
+            })
+            .id();
+        if plan.sky {
+            world.entity_mut(camera).insert(common::sky_camera());
+        }
+        if let Some(buffer) = &buffer {
+            world.entity_mut(camera).insert(CloudBuffer(buffer.clone()));
+        }
+        let mut studio = Self {
+            app,
+            camera,
+            sun,
+            target,
+            buffer,
+        };
+        studio.pose(plan, 0);
+        Ok(studio)
+    }
+
+    /// Puts camera, sun and clock where they are in the counted frame `k`.
+    fn pose(&mut self, plan: &Plan, k: u32) {
+        let (pose, sun) = (plan.camera(k), plan.sun(k).transform());
+        let aspect = plan.size.0 as f32 / plan.size.1 as f32;
+        let world = self.app.world_mut();
+        world
+            .entity_mut(self.camera)
+            .insert((pose.transform(), pose.projection(aspect)));
+        world.entity_mut(self.sun).insert(sun);
+        world.resource_mut::<CloudClock>().seconds = plan.seconds(k);
+    }
+
+    /// Renders one frame and waits until the GPU is done with it.
+    fn update(&mut self) -> Result<()> {
+        self.app.update();
+        if self.app.should_exit().is_some() {
+            bail!("the engine stopped rendering; the lines above say why");
+        }
+        let device = self.app.world().resource::<RenderDevice>().wgpu_device();
+        let wait = PollType::Wait {
+            submission_index: None,
+            timeout: None,
+        };
+        device
+            .poll(wait)
+            .map_err(|error| anyhow!("waiting for the GPU: {error}"))?;
+        Ok(())
+    }
+
+    /// Renders until textures are baked and pipelines are there, then a few frames more.
+    fn make_ready(&mut self, plan: &Plan) -> Result<()> {
+        let started = Instant::now();
+        let stage = Stage::begin("baking textures", 100);
+        // Thrown away: it has the screenshot's own pipeline made before frames are timed.
+        if plan.out.is_some() {
+            self.app
+                .world_mut()
+                .spawn(Screenshot::image(self.target.clone()));
+        }
+        let mut settled = 0;
+        while settled < SETTLING_FRAMES {
+            ensure!(
+                started.elapsed() < READY_WITHIN,
+                "textures and pipelines were not ready within {} s",
+                READY_WITHIN.as_secs()
+            );
+            self.update()?;
+            let world = self.app.world();
+            let status = world.resource::<CloudStatus>();
+            if let Some(reason) = status.unsupported() {
+                bail!("clouds cannot be drawn on this device: {reason}");
+            }
+            let ready = status.is_ready();
+            stage.at((world.resource::<CloudTextureStatus>().progress * 100.0) as u64);
+            settled = if ready && self.pipelines_made()? {
+                settled + 1
+            } else {
+                0
+            };
+        }
+        Ok(())
+    }
+
+    /// Whether no pipeline is waiting.
+    ///
+    /// # Errors
+    /// A pipeline failed: its shader does not compile or the device refused it.
+    fn pipelines_made(&self) -> Result<bool> {
+        let Some(render) = self.app.get_sub_app(RenderApp) else {
+            bail!("the renderer did not start")
+        };
+        let cache = render.world().resource::<PipelineCache>();
+        let waiting: Vec<_> = cache.waiting_pipelines().collect();
+        for (id, pipeline) in cache.pipelines().enumerate() {
+            if let CachedPipelineState::Err(error) = &pipeline.state
+                && !waiting.contains(&id)
+            {
+                bail!("a pipeline failed: {error}");
+            }
+        }
+        Ok(waiting.is_empty())
+    }
+
+    /// Renders the frames that count, asks for the last one, and waits until it is back.
+    fn count_frames(&mut self, plan: &Plan) -> Result<Timings> {
+        let mut timings = Timings::default();
+        if let Some(mut view) = self.app.world_mut().get_mut::<CloudView>(self.camera) {
+            view.reset += 1;
+        }
+        let stage = Stage::begin("rendering frames", plan.frames.into());
+        let mut readback = None;
+        let (mut update, mut waiting_since) = (0, Instant::now());
+        loop {
+            let counted = update < plan.frames;
+            if counted {
+                self.pose(plan, update);
+                waiting_since = Instant::now();
+            }
+            if update + 1 == plan.frames {
+                readback = self.request(plan);
+            }
+            let began = Instant::now();
+            self.update()?;
+            if counted {
+                timings.add_frame(began.elapsed().as_secs_f64() * 1e3);
+            }
+            if let Some(entity) = readback.take() {
+                self.app.world_mut().entity_mut(entity).remove::<Readback>();
+            }
+            let of_counted = (LAG..plan.frames + LAG).contains(&update);
+            timings.take_passes(self.app.world().resource::<DiagnosticsStore>(), of_counted);
+            update += 1;
+            stage.at(u64::from(update.min(plan.frames)));
+            if update >= plan.frames + LAG && self.is_back(plan) {
+                return Ok(timings);
+            }
+            ensure!(
+                update < plan.frames || waiting_since.elapsed() < BACK_WITHIN,
+                "the picture did not come back from the GPU within {} s",
+                BACK_WITHIN.as_secs()
+            );
+        }
+    }
+
+    /// Asks for what the next update renders.
+    fn request(&mut self, plan: &Plan) -> Option<Entity> {
+        let world = self.app.world_mut();
+        if plan.out.is_some() {
+            world.spawn(Screenshot::image(self.target.clone())).observe(
+                |shot: On<ScreenshotCaptured>, mut caught: ResMut<Caught>| {
+                    caught.picture.get_or_insert_with(|| shot.image.clone());
+                },
+            );
+        }
+        let buffer = self.buffer.clone()?;
+        let mut entity = world.spawn(Readback::texture(buffer));
+        entity.observe(|read: On<ReadbackComplete>, mut caught: ResMut<Caught>| {
+            caught.cloud.get_or_insert_with(|| read.data.clone());
+        });
+        Some(entity.id())
+    }
+
+    fn is_back(&self, plan: &Plan) -> bool {
+        let caught = self.app.world().resource::<Caught>();
+        (plan.out.is_none() || caught.picture.is_some())
+            && (self.buffer.is_none() || caught.cloud.is_some())
+    }
+
+    fn shot(mut self, plan: &Plan, timings: Timings) -> Result<Shot> {
+        let world = self.app.world_mut();
+        let caught = std::mem::take(&mut *world.resource_mut::<Caught>());
+        let picture = caught.picture.map(Image::try_into_dynamic).transpose();
+        let picture = picture.map_err(|error| anyhow!("the picture: {error}"))?;
+        let cloud = caught
+            .cloud
+            .map(|bytes| cloud_image(plan.size, &bytes))
+            .transpose()?;
+        let info = world.resource::<RenderAdapterInfo>();
+        let adapter = format!("{} ({:?})", info.name, info.backend);
+        Ok(Shot {
+            picture: picture.map(|picture| picture.to_rgb8()),
+            cloud,
+            timings,
+            adapter,
+        })
+    }
+}
+
+/// The image in a texture's bytes, whose rows are padded to a multiple of 256.
+fn cloud_image((width, height): (u32, u32), bytes: &[u8]) -> Result<Rgba32FImage> {
+    let row = width as usize * 16;
+    let stride = RenderDevice::align_copy_bytes_per_row(row);
+    let values = bytes
+        .chunks(stride)
+        .flat_map(|line| &line[..row.min(line.len())])
+        .copied()
+        .collect::<Vec<u8>>()
+        .as_chunks::<4>()
+        .0
+        .iter()
+        .map(|b| f32::from_le_bytes(*b))
+        .collect();
+    Rgba32FImage::from_raw(width, height, values).ok_or_else(|| {
+        anyhow!(
+            "the cloud buffer came back with {} bytes, too few for {width}x{height}",
+            bytes.len()
+        )
+    })
+}

@@ -1,0 +1,140 @@
+//! [`CloudModel`] as the shader reads it.
+
+use bevy::{math::DVec2, prelude::*, render::render_resource::ShaderType};
+
+use super::TangentFrame;
+use crate::settings::{CloudModel, Erosion};
+
+/// The group map is this many times larger than the coverage map: irrational, so the pair never repeats.
+const GROUP_SCALE: f64 = 2.618_033_988_75;
+
+/// Texels along one side of each texture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct TexelSizes {
+    pub billow: u32,
+    pub wisp: u32,
+    pub coverage: u32,
+    pub type_map: u32,
+}
+
+/// `Model` of `model.wesl`, field for field.
+#[derive(ShaderType, Clone, Copy, Debug, Default)]
+pub(crate) struct ModelUniform {
+    radius: f32,
+    bottom: f32,
+    top: f32,
+    coverage: f32,
+    cloud_type: f32,
+    type_variation: f32,
+    map_variation: f32,
+    density: f32,
+    extinction: f32,
+    erosion: u32,
+    noise_strength: f32,
+    detail_strength: f32,
+    wisp_height: f32,
+    billow_rate: f32,
+    detail_rate: f32,
+    wisp_rate: f32,
+    map_rate: f32,
+    group_rate: f32,
+    type_rate: f32,
+    skew: f32,
+    lean: Vec4,
+    map_offset: Vec4,
+    type_offset: Vec4,
+    billow_offset: Vec4,
+    detail_offset: Vec4,
+    wisp_offset: Vec4,
+    texels: Vec4,
+    map_texels: Vec4,
+    albedo: Vec4,
+}
+
+impl ModelUniform {
+    /// The model at cloud time `seconds`, seen from a frame.
+    pub fn new(model: &CloudModel, seconds: f64, frame: &TangentFrame, sizes: TexelSizes) -> Self {
+        let wind = DVec2::new(model.wind.x.into(), model.wind.z.into());
+        let rise = f64::from(model.wind.y + model.evolution) * seconds;
+        let map = frame.map - wind * seconds;
+        let turned = DVec2::new(0.8 * map.x - 0.6 * map.y, 0.6 * map.x + 0.8 * map.y);
+        let group_scale = f64::from(model.map_scale) * GROUP_SCALE;
+        let wrap = |metres: DVec2, scale: f64| wrapped(metres, scale);
+        let own = wrap(map, model.map_scale.into());
+        let group = wrap(turned, group_scale);
+        let kind = wrap(map, model.type_scale.into());
+        let volume = |scale: f32| {
+            let xz = wrapped(map, scale.into());
+            let y = (-rise / f64::from(scale)).rem_euclid(1.0) as f32;
+            Vec4::new(xz.x, y, xz.y, 0.0)
+        };
+        let texel = |scale: f64, size: u32| (scale / f64::from(size.max(1))).log2() as f32;
+        let thickness = model.top - model.bottom;
+        let lean = wind.normalize_or_zero().as_vec2() * model.wind_skew;
+        Self {
+            radius: frame.radius as f32,
+            bottom: model.bottom,
+            top: model.top,
+            coverage: model.coverage,
+            cloud_type: model.cloud_type,
+            type_variation: model.type_variation,
+            map_variation: model.map_variation,
+            density: model.density,
+            extinction: model.extinction,
+            erosion: match model.erosion {
+                Erosion::Subtract => 0,
+                Erosion::Remap => 1,
+            },
+            noise_strength: model.noise_strength,
+            detail_strength: model.detail_strength,
+            wisp_height: model.wisp_height,
+            billow_rate: 1.0 / model.billow_scale,
+            detail_rate: 1.0 / model.detail_scale,
+            wisp_rate: 1.0 / model.wisp_scale,
+            map_rate: 1.0 / model.map_scale,
+            group_rate: (1.0 / group_scale) as f32,
+            type_rate: 1.0 / model.type_scale,
+            skew: model.wind_skew / thickness,
+            lean: lean.extend(0.0).extend(0.0),
+            map_offset: Vec4::new(own.x, own.y, group.x, group.y),
+            type_offset: kind.extend(0.0).extend(0.0),
+            billow_offset: volume(model.billow_scale),
+            detail_offset: volume(model.detail_scale),
+            wisp_offset: volume(model.wisp_scale),
+            texels: Vec4::new(
+                texel(model.billow_scale.into(), sizes.billow),
+                texel(model.detail_scale.into(), sizes.billow),
+                texel(model.wisp_scale.into(), sizes.wisp),
+                texel(model.map_scale.into(), sizes.coverage),
+            ),
+            map_texels: Vec4::new(
+                texel(group_scale, sizes.coverage),
+                texel(model.type_scale.into(), sizes.type_map),
+                0.0,
+                0.0,
+            ),
+            albedo: model.albedo.extend(1.0),
+        }
+    }
+}
+
+/// Position in repeats of `scale`, wrapped to 0..1 in f64: exact after hours of wind, far from the origin.
+fn wrapped(metres: DVec2, scale: f64) -> Vec2 {
+    let repeats = metres / scale;
+    Vec2::new(repeats.x.rem_euclid(1.0) as f32, repeats.y.rem_euclid(1.0) as f32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn hours_of_wind_lose_nothing() {
+        // A week at 30 m/s: the fraction must still be right to a texel's ten-thousandth.
+        let metres = DVec2::new(30.0 * 7.0 * 86_400.0, -12.34);
+        let at = wrapped(metres, 26_000.0);
+        let exact = (18_144_000.0_f64 / 26_000.0).fract();
+        assert!((f64::from(at.x) - exact).abs() < 1e-6);
+        assert!((0.0..1.0).contains(&at.y));
+    }
+}

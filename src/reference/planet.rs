@@ -1,0 +1,113 @@
+//! A round planet: altitude, rays against shells, map coordinates. Twin of `model/planet.wesl`.
+//!
+//! Positions are in the camera's tangent frame: origin on the surface straight below the camera, y up, the camera at
+//! (0, `h0`, 0). Lengths in metres.
+
+use bevy::math::{DVec2, DVec3};
+
+/// Radius of the planet where the scene's `Atmosphere` gives none (m).
+pub const PLANET_RADIUS: f64 = 6_360_000.0;
+
+/// A stretch of a ray: distances from the camera (m) where it begins and ends.
+pub type Interval = [f64; 2];
+
+/// Altitude of `p` above a planet of this radius (m).
+pub fn altitude(p: DVec3, radius: f64) -> f64 {
+    (p + DVec3::Y * radius).length() - radius
+}
+
+/// Where the whole line through the camera crosses the shell of altitude `shell`, in order; `None` where it misses.
+///
+/// `h0` is the camera's altitude and `mu` the cosine between the ray and up (−1..=1). The roots of
+/// `t² + 2bt + c`, with `b = (R + h0)·mu` and `c = (h0 − H)(2R + h0 + H)` (Högfeldt 5.2; his algorithm 5.2 is
+/// misprinted), the one that does not cancel first.
+pub fn shell_roots(h0: f64, mu: f64, shell: f64, radius: f64) -> Option<Interval> {
+    let b = (radius + h0) * mu;
+    let c = (h0 - shell) * (2.0 * radius + h0 + shell);
+    let discriminant = b * b - c;
+    if discriminant.is_nan() || discriminant < 0.0 {
+        return None;
+    }
+    // Not signum(b), whose zero would lose both roots of a level ray.
+    let sign = if b >= 0.0 { 1.0 } else { -1.0 };
+    let q = -(b + sign * discriminant.sqrt());
+    let other = if q == 0.0 { 0.0 } else { c / q };
+    Some([q.min(other), q.max(other)])
+}
+
+/// The parts of a ray between the shells `bottom` and `top` within 0..=`t_max`, in order: none, one or two.
+///
+/// The planet's surface (altitude 0) ends the ray. A camera below it (in a valley under sea level) sees out through
+/// it, but sees nothing below the horizontal. `bottom` and `top` are altitudes; the rest is as in [`shell_roots`].
+pub fn shell_intervals(h0: f64, mu: f64, bottom: f64, top: f64, radius: f64, t_max: f64) -> Vec<Interval> {
+    let Some(outer) = shell_roots(h0, mu, top, radius) else { return Vec::new() };
+    if h0 < 0.0 && mu < 0.0 {
+        return Vec::new();
+    }
+    let mut end = t_max;
+    if h0 >= 0.0
+        && let Some([first, last]) = shell_roots(h0, mu, 0.0, radius)
+        && last > 0.0
+    {
+        end = end.min(first.max(0.0));
+    }
+    let parts = match shell_roots(h0, mu, bottom, radius) {
+        None => vec![outer],
+        Some(inner) => vec![[outer[0], inner[0]], [inner[1], outer[1]]],
+    };
+    parts.into_iter().map(|[a, b]| [a.max(0.0), b.min(end)]).filter(|[a, b]| b > a).collect()
+}
+
+/// Horizontal map coordinates of `p` relative to the point below the camera (m): arc length along the surface, in the
+/// direction of (x, z). The planet's centre maps to the origin.
+pub fn map_position(p: DVec3, radius: f64) -> DVec2 {
+    let across = DVec2::new(p.x, p.z);
+    across.normalize_or_zero() * radius * across.length().atan2(radius + p.y)
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{Rng, SeedableRng, rngs::StdRng};
+
+    use super::*;
+
+    /// Walks along rays and asks of each point what its altitude says.
+    #[test]
+    fn intervals_hold_exactly_the_points_between_the_shells() {
+        let mut rng = StdRng::seed_from_u64(7);
+        let mut inside = 0;
+        for _ in 0..4000 {
+            let bottom = rng.random_range(100.0..3000.0);
+            let top = bottom + rng.random_range(100.0..9000.0);
+            let h0 = match rng.random_range(0..4) {
+                0 => rng.random_range(-100.0..bottom),
+                1 => rng.random_range(bottom..top),
+                2 => rng.random_range(top..30_000.0),
+                _ => rng.random_range(30_000.0..5e6),
+            };
+            let mu: f64 = if rng.random_bool(0.5) { rng.random_range(-0.2..0.1) } else { rng.random_range(-1.0..1.0) };
+            let intervals = shell_intervals(h0, mu, bottom, top, PLANET_RADIUS, 3e6);
+            assert!(intervals.len() <= 2);
+            let direction = DVec3::new((1.0 - mu * mu).sqrt(), mu, 0.0);
+            let mut blocked = h0 < 0.0 && mu < 0.0;
+            for step in 1..1500 {
+                let t = f64::from(step) * 2000.0;
+                let h = altitude(DVec3::Y * h0 + direction * t, PLANET_RADIUS);
+                blocked |= h0 >= 0.0 && h < -1.0;
+                let expected = !blocked && (bottom..top).contains(&h);
+                let near_an_edge = (h - bottom).abs() < 0.01 || (h - top).abs() < 0.01 || h.abs() < 1.0;
+                let found = intervals.iter().any(|&[a, b]| (a..b).contains(&t));
+                assert!(found == expected || near_an_edge, "h0 {h0} mu {mu} shells {bottom}..{top} t {t} h {h}");
+                inside += u32::from(found);
+            }
+        }
+        assert!(inside > 10_000, "only {inside} points lay inside");
+    }
+
+    #[test]
+    fn map_coordinates_are_arc_lengths() {
+        let quarter = map_position(DVec3::new(0.0, -PLANET_RADIUS, PLANET_RADIUS), PLANET_RADIUS);
+        assert!(quarter.abs_diff_eq(DVec2::new(0.0, PLANET_RADIUS * std::f64::consts::FRAC_PI_2), 1e-6));
+        assert_eq!(map_position(DVec3::Y * 800.0, PLANET_RADIUS), DVec2::ZERO);
+    }
+}

@@ -1,0 +1,143 @@
+//! `CloudFrame` of `frame.wesl`: everything one view's passes share.
+
+use bevy::{
+    prelude::*,
+    render::render_resource::ShaderType,
+};
+
+use super::history::FrameInWindow;
+use crate::{
+    model::TangentFrame,
+    reference::phase::Phase,
+    settings::{CloudLighting, CloudQuality, Integration},
+    textures::n_rooks::n_rooks,
+};
+
+/// The brightest directional light.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(crate) struct Sun {
+    /// Towards the sun, world axes.
+    pub direction: Vec3,
+    /// Illuminance (lux, linear RGB).
+    pub illuminance: Vec3,
+    /// Angular diameter (rad).
+    pub angular_size: f32,
+}
+
+/// What the uniform is made from, for one view.
+pub(crate) struct FrameInput<'a> {
+    pub clip_from_view: Mat4,
+    pub world_from_view: Quat,
+    pub viewport: UVec4,
+    pub space: &'a TangentFrame,
+    pub sun: Sun,
+    pub exposure: f32,
+    pub quality: &'a CloudQuality,
+    pub lighting: &'a CloudLighting,
+    pub window: FrameInWindow,
+}
+
+/// `CloudFrame` of `frame.wesl`, field for field.
+#[derive(ShaderType, Clone, Copy, Debug, Default)]
+pub(crate) struct FrameUniform {
+    view_from_clip: Mat4,
+    local_from_view: Mat4,
+    sun_direction: Vec4,
+    sun_illuminance: Vec4,
+    phase_params: Vec4,
+    octave_factors: Vec4,
+    ambient: Vec4,
+    ground_albedo: Vec4,
+    sky_fallback: Vec4,
+    steps: Vec4,
+    limits: Vec4,
+    offsets: Vec4,
+    camera: Vec4,
+    history: Vec4,
+    size: UVec4,
+    viewport: UVec4,
+    counts: UVec4,
+    flags: UVec4,
+    layers: UVec4,
+}
+
+/// Marched size of a viewport.
+pub(crate) fn marched_size(viewport: UVec4, quality: &CloudQuality) -> UVec2 {
+    let divisor = quality.resolution.divisor();
+    UVec2::new(viewport.z.div_ceil(divisor), viewport.w.div_ceil(divisor))
+}
+
+/// Angle a marched texel spans (rad): 2 tan(fov/2) over the marched height.
+pub(crate) fn texel_angle(clip_from_view: Mat4, viewport: UVec4, quality: &CloudQuality) -> f32 {
+    2.0 * quality.resolution.divisor() as f32 / (clip_from_view.y_axis.y.abs() * viewport.w as f32)
+}
+
+impl FrameUniform {
+    pub fn new(input: &FrameInput) -> Self {
+        let FrameInput { space, sun, quality, lighting, window, viewport, .. } = input;
+        let local_from_world = space.local_from_world.as_quat();
+        let size = marched_size(*viewport, quality);
+        let rooks = n_rooks(window.window as usize);
+        let slot = window.index % window.window;
+        let rook = rooks[slot as usize % rooks.len()];
+        let stratum = 1.0 / window.window as f32;
+        // Settings are validated before they get here, so the fallback is never seen.
+        let (kind, phase_params) =
+            Phase::from_settings(lighting).unwrap_or(Phase::Isotropic).shader_parameters();
+        Self {
+            view_from_clip: input.clip_from_view.inverse(),
+            local_from_view: Mat4::from_quat(local_from_world * input.world_from_view),
+            sun_direction: (local_from_world * sun.direction).extend(sun.angular_size),
+            sun_illuminance: (sun.illuminance * lighting.sun_strength).extend(0.0),
+            phase_params: phase_params.into(),
+            octave_factors: Vec4::new(
+                lighting.attenuation,
+                lighting.contribution,
+                lighting.eccentricity,
+                lighting.phase_limit,
+            ),
+            ambient: (lighting.ambient_tint * lighting.ambient_strength).extend(lighting.powder),
+            ground_albedo: lighting.ground_albedo.extend(0.0),
+            sky_fallback: lighting.sky_fallback.extend(0.0),
+            steps: Vec4::new(quality.step, quality.step_growth, quality.light_step, quality.light_growth),
+            limits: Vec4::new(
+                quality.transmittance_stop,
+                quality.density_skip,
+                quality.max_distance,
+                // smoothstep is undefined where both edges meet.
+                quality.max_distance * lighting.fade_start.min(0.999),
+            ),
+            offsets: Vec4::new(rook[0], rook[1], slot as f32 * stratum, stratum),
+            camera: Vec4::new(
+                space.altitude as f32,
+                space.radius as f32,
+                quality.lod_bias,
+                texel_angle(input.clip_from_view, *viewport, quality),
+            ),
+            history: Vec4::new(
+                window.exposure,
+                input.exposure / window.exposure,
+                window.held_after() as f32,
+                lighting.aerial_perspective,
+            ),
+            size: UVec4::new(size.x, size.y, quality.resolution.divisor(), window.index & 255),
+            viewport: *viewport,
+            counts: UVec4::new(quality.max_steps, quality.light_steps, lighting.octaves, kind),
+            flags: UVec4::new(
+                quality.long_step,
+                quality.empty_steps,
+                match quality.integration {
+                    Integration::EnergyConserving => 0,
+                    Integration::Naive => 1,
+                },
+                quality.offsets.into(),
+            ),
+            layers: UVec4::new(
+                window.layer(),
+                window.leaving_layer(),
+                window.layers(),
+                window.held_before,
+            ),
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! How cloud is seen: sky, march, accumulate, composite. One folder a stage, shader inside.
+
+mod bind_groups;
+mod buffer;
+mod frame;
+pub(crate) mod history;
+mod passes;
+mod status;
+mod view;
+
+use bevy::{
+    asset::embedded_asset,
+    core_pipeline::{
+        core_3d::prepare_core_3d_depth_textures,
+        schedule::{Core3d, Core3dSystems},
+    },
+    prelude::*,
+    render::{GpuResourceAppExt, Render, RenderSystems},
+    shader::load_shader_library,
+};
+
+use crate::model::ModelBindings;
+
+pub use buffer::CloudBuffer;
+pub(crate) use status::{SharedStatus, StatusFlags};
+pub use status::CloudStatus;
+
+/// Shaders, and the systems of the render world.
+pub(crate) struct CloudRenderPlugin;
+
+impl Plugin for CloudRenderPlugin {
+    fn build(&self, app: &mut App) {
+        load_shader_library!(app, "frame.wesl");
+        load_shader_library!(app, "march/phase.wesl");
+        load_shader_library!(app, "march/integrate.wesl");
+        load_shader_library!(app, "march/lighting.wesl");
+        load_shader_library!(app, "march/aerial.wesl");
+        load_shader_library!(app, "composite/upsample.wesl");
+        load_shader_library!(app, "sky/sky.wesl");
+        embedded_asset!(app, "march/march.wesl");
+        embedded_asset!(app, "accumulate/accumulate.wesl");
+        embedded_asset!(app, "composite/composite.wesl");
+        embedded_asset!(app, "composite/publish.wesl");
+        app.init_resource::<CloudStatus>().register_type::<CloudBuffer>();
+    }
+}
+
+/// Adds the render world's systems; called once the device is known to be able.
+pub(crate) fn build_render(render_app: &mut SubApp) {
+    render_app
+        .init_resource::<view::ExtractedClouds>()
+        .init_gpu_resource::<ModelBindings>()
+        .init_gpu_resource::<bind_groups::CloudPipelines>()
+        .add_systems(ExtractSchedule, (view::extract_settings, view::extract_views))
+        .add_systems(
+            Render,
+            (
+                view::request_depth
+                    .in_set(RenderSystems::Prepare)
+                    .before(prepare_core_3d_depth_textures),
+                view::prepare_views.in_set(RenderSystems::PrepareResources),
+                bind_groups::prepare_bind_groups.in_set(RenderSystems::PrepareBindGroups),
+            ),
+        )
+        .add_systems(
+            Core3d,
+            (passes::cloud_sky, passes::cloud_march, passes::cloud_accumulate, passes::cloud_composite)
+                .chain()
+                // Past TAA too: cloud has a history of its own, and TAA would reproject it as the sky it covers.
+                .after(Core3dSystems::MainPass)
+                .after(Core3dSystems::EarlyPostProcess)
+                .before(Core3dSystems::PostProcess),
+        );
+}

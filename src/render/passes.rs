@@ -1,0 +1,137 @@
+//! The stages of a frame, as systems in `Core3d`.
+
+use bevy::{
+    prelude::*,
+    render::{
+        camera::ExtractedCamera,
+        diagnostic::RecordDiagnostics,
+        render_resource::*,
+        renderer::{RenderContext, ViewQuery},
+        view::ViewTarget,
+    },
+};
+
+use super::{bind_groups::CloudBindGroups, history::CloudHistory};
+
+/// Texels along one side of a workgroup.
+const GROUP: u32 = 8;
+
+/// Records one compute stage: groups 0 to 2, one dispatch, one GPU timing span.
+fn dispatch(
+    ctx: &mut RenderContext,
+    label: &'static str,
+    pipeline: Option<&ComputePipeline>,
+    groups: [(&BindGroup, &[u32]); 3],
+    size: UVec2,
+) {
+    let Some(pipeline) = pipeline else { return };
+    let diagnostics = ctx.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
+    let mut pass = ctx
+        .command_encoder()
+        .begin_compute_pass(&ComputePassDescriptor { label: Some(label), timestamp_writes: None });
+    let span = diagnostics.pass_span(&mut pass, label);
+    pass.set_pipeline(pipeline);
+    for (index, (group, offsets)) in (0..).zip(groups) {
+        pass.set_bind_group(index, group, offsets);
+    }
+    pass.dispatch_workgroups(size.x, size.y, 1);
+    span.end(&mut pass);
+}
+
+fn workgroups(size: UVec2) -> UVec2 {
+    (size + GROUP - 1) / GROUP
+}
+
+/// Ambient light for the view.
+pub(crate) fn cloud_sky(view: ViewQuery<&CloudBindGroups>, cache: Res<PipelineCache>, mut ctx: RenderContext) {
+    let groups = view.into_inner();
+    let (id, own) = &groups.sky;
+    dispatch(
+        &mut ctx,
+        "cloud_sky",
+        cache.get_compute_pipeline(*id),
+        [(&groups.air, &groups.air_offsets), (&groups.empty, &[]), (own, &[])],
+        UVec2::ONE,
+    );
+}
+
+/// One ray a texel.
+pub(crate) fn cloud_march(
+    view: ViewQuery<(&CloudBindGroups, &CloudHistory)>,
+    cache: Res<PipelineCache>,
+    mut ctx: RenderContext,
+) {
+    let (groups, history) = view.into_inner();
+    let (id, own) = &groups.march;
+    dispatch(
+        &mut ctx,
+        "cloud_march",
+        cache.get_compute_pipeline(*id),
+        [(&groups.air, &groups.air_offsets), (&groups.model, &[]), (own, &[])],
+        workgroups(history.size()),
+    );
+}
+
+/// Adds the newest frame, takes away the oldest; then publishes the result where it was asked for.
+pub(crate) fn cloud_accumulate(
+    view: ViewQuery<(&CloudBindGroups, &CloudHistory)>,
+    cache: Res<PipelineCache>,
+    mut ctx: RenderContext,
+) {
+    let (groups, history) = view.into_inner();
+    let empty = (&groups.empty, &[][..]);
+    let (id, own) = &groups.accumulate;
+    dispatch(
+        &mut ctx,
+        "cloud_accumulate",
+        cache.get_compute_pipeline(*id),
+        [empty, empty, (own, &[])],
+        workgroups(history.size()),
+    );
+    if let Some((id, own)) = &groups.publish {
+        dispatch(
+            &mut ctx,
+            "cloud_publish",
+            cache.get_compute_pipeline(*id),
+            [empty, empty, (own, &[])],
+            workgroups(history.viewport_size()),
+        );
+    }
+}
+
+/// Blends the clouds over the view's colour.
+pub(crate) fn cloud_composite(
+    view: ViewQuery<(&CloudBindGroups, &ViewTarget, &ExtractedCamera)>,
+    cache: Res<PipelineCache>,
+    mut ctx: RenderContext,
+) {
+    let (groups, target, camera) = view.into_inner();
+    let (id, own) = &groups.composite;
+    let Some(pipeline) = cache.get_render_pipeline(*id) else { return };
+    let diagnostics = ctx.diagnostic_recorder();
+    let diagnostics = diagnostics.as_deref();
+    let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
+        label: Some("cloud_composite"),
+        color_attachments: &[Some(RenderPassColorAttachment {
+            view: target.main_texture_view(),
+            depth_slice: None,
+            resolve_target: None,
+            ops: Operations { load: LoadOp::Load, store: StoreOp::Store },
+        })],
+        depth_stencil_attachment: None,
+        timestamp_writes: None,
+        occlusion_query_set: None,
+        multiview_mask: None,
+    });
+    let span = diagnostics.pass_span(&mut pass, "cloud_composite");
+    if let Some(viewport) = &camera.viewport {
+        pass.set_camera_viewport(viewport);
+    }
+    pass.set_render_pipeline(pipeline);
+    pass.set_bind_group(0, &groups.empty, &[]);
+    pass.set_bind_group(1, &groups.empty, &[]);
+    pass.set_bind_group(2, own, &[]);
+    pass.draw(0..3, 0..1);
+    span.end(&mut pass);
+}

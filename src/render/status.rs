@@ -1,0 +1,51 @@
+//! Whether clouds can be and are being drawn: told to the main world by the render world.
+
+use std::sync::{
+    Arc, OnceLock,
+    atomic::{AtomicBool, Ordering},
+};
+
+use bevy::prelude::*;
+
+#[derive(Default, Debug)]
+pub(crate) struct SharedStatus {
+    views_ready: AtomicBool,
+    unsupported: OnceLock<String>,
+}
+
+/// Whether clouds are being drawn. A resource of the main world.
+#[derive(Resource, Clone, Default, Debug)]
+pub struct CloudStatus(pub(crate) Arc<SharedStatus>);
+
+impl CloudStatus {
+    /// Whether the textures are baked and the pipelines of every view with clouds are compiled. Until then nothing
+    /// is drawn. False while no camera shows clouds.
+    pub fn is_ready(&self) -> bool {
+        self.0.views_ready.load(Ordering::Acquire)
+    }
+
+    /// Why this device cannot draw clouds, if it cannot: names the missing limit and the adapter.
+    pub fn unsupported(&self) -> Option<&str> {
+        self.0.unsupported.get().map(String::as_str)
+    }
+
+    pub(crate) fn set_unsupported(&self, reason: String) {
+        // Decided once, when the device is known.
+        let _ = self.0.unsupported.set(reason);
+    }
+}
+
+/// The same, in the render world.
+#[derive(Resource, Clone)]
+pub(crate) struct StatusFlags(pub Arc<SharedStatus>);
+
+impl StatusFlags {
+    pub fn set_views_ready(&self, ready: bool) {
+        self.0.views_ready.store(ready, Ordering::Release);
+    }
+
+    /// Frames count towards a window only once they are really drawn.
+    pub fn frames_may_count(&self) -> bool {
+        self.0.views_ready.load(Ordering::Acquire)
+    }
+}

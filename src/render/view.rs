@@ -1,0 +1,293 @@
+//! From the main world to what one view's passes need.
+
+use bevy::{
+    math::DVec3,
+    pbr::{ExtractedAtmosphere, ExtractedDirectionalLight},
+    prelude::*,
+    render::{
+        Extract,
+        camera::ExtractedCamera,
+        render_resource::{TextureUsages, UniformBuffer},
+        renderer::{RenderDevice, RenderQueue},
+        sync_world::RenderEntity,
+        view::{ExtractedView, Msaa},
+    },
+};
+
+use super::{
+    CloudBuffer, StatusFlags,
+    frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
+    history::{CloudHistory, HistoryKey, Pose},
+};
+use crate::{
+    model::{ModelUniform, TangentFrame, TexelSizes},
+    settings::{CloudQuality, CloudSettings, CloudView, GoodSettings, Validate},
+    textures::CloudTextureViews,
+};
+
+/// Planet radius where the scene has no `Atmosphere` (m): that of Bevy's default one.
+const EARTH_RADIUS: f64 = 6_360_000.0;
+
+/// The settings of this frame.
+#[derive(Resource, Default)]
+pub(crate) struct ExtractedClouds {
+    settings: CloudSettings,
+    /// Counts changes that make held frames wrong. The clock is not one of them: drift is judged by distance.
+    version: u64,
+}
+
+/// A camera that shows clouds.
+#[derive(Component, Clone, Debug)]
+pub(crate) struct ExtractedCloudView {
+    quality: CloudQuality,
+    reset: u32,
+    pub buffer: Option<AssetId<Image>>,
+}
+
+/// A view's uniforms.
+#[derive(Component, Default)]
+pub(crate) struct CloudUniforms {
+    pub frame: UniformBuffer<FrameUniform>,
+    pub model: UniformBuffer<ModelUniform>,
+    pub world_from_local: UniformBuffer<Mat4>,
+}
+
+/// What a view has of ours while it shows clouds.
+type Ours = (ExtractedCloudView, CloudUniforms, CloudHistory, super::bind_groups::CloudBindGroups);
+
+pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut<ExtractedClouds>) {
+    let fresh = &good.0;
+    let clock = out.settings.clock.clone();
+    out.settings.clock = fresh.clock.clone();
+    if out.settings != *fresh {
+        out.settings = fresh.clone();
+        out.version += 1;
+    } else if clock.speed != fresh.clock.speed {
+        out.settings.clock = fresh.clock.clone();
+    }
+}
+
+pub(crate) fn extract_views(
+    mut commands: Commands,
+    cameras: Extract<Query<(RenderEntity, &Camera, Option<&CloudView>, Option<&CloudBuffer>)>>,
+    good: Extract<Res<GoodSettings>>,
+    had: Query<(), With<ExtractedCloudView>>,
+    mut warned: Local<Option<String>>,
+) {
+    for (entity, camera, view, buffer) in &cameras {
+        let Some(view) = view.filter(|v| v.enabled && camera.is_active) else {
+            if had.contains(entity) {
+                commands.entity(entity).remove::<Ours>();
+            }
+            continue;
+        };
+        let mut quality = good.0.quality.clone();
+        match (view.validate(), &view.quality) {
+            (Ok(()), Some(own)) => quality.clone_from(own),
+            (Ok(()), None) => {}
+            (Err(error), _) => {
+                let text = error.to_string();
+                if warned.as_ref() != Some(&text) {
+                    error!("clouds: {text}; this view uses the resource's quality");
+                    *warned = Some(text);
+                }
+            }
+        }
+        commands.entity(entity).insert(ExtractedCloudView {
+            quality,
+            reset: view.reset,
+            buffer: buffer.map(|b| b.0.id()),
+        });
+    }
+}
+
+/// The march reads the depth buffer.
+pub(crate) fn request_depth(mut cameras: Query<&mut Camera3d, With<ExtractedCloudView>>) {
+    for mut camera in &mut cameras {
+        camera.depth_texture_usages.0 |= TextureUsages::TEXTURE_BINDING.bits();
+    }
+}
+
+fn brightest_sun(lights: &Query<&ExtractedDirectionalLight>) -> Sun {
+    lights
+        .iter()
+        .map(|light| Sun {
+            direction: light.transform.back().as_vec3(),
+            illuminance: light.color.to_vec3() * light.illuminance,
+            angular_size: light.sun_disk_angular_size,
+        })
+        .filter(|sun| sun.direction.is_finite() && sun.illuminance.is_finite())
+        .max_by(|a, b| a.illuminance.element_sum().total_cmp(&b.illuminance.element_sum()))
+        // Without a sun only the sky's light is left; its direction does not matter then.
+        .unwrap_or(Sun { direction: Vec3::Y, ..default() })
+}
+
+/// Why a view cannot show clouds.
+fn refusal(view: &ExtractedView, space: Option<&TangentFrame>) -> Option<&'static str> {
+    if view.clip_from_view.w_axis.w == 1.0 {
+        Some("its projection is orthographic, and clouds need a perspective one")
+    } else if !view.clip_from_view.is_finite() || !view.clip_from_view.inverse().is_finite() {
+        Some("its projection cannot be inverted (near plane 0, or a field that is not a number?)")
+    } else if space.is_none() || !view.world_from_view.rotation().is_finite() {
+        Some("its transform is not a number, or it sits at the planet's centre")
+    } else {
+        None
+    }
+}
+
+#[derive(bevy::ecs::query::QueryData)]
+#[query_data(mutable)]
+pub(crate) struct PreparedView {
+    entity: Entity,
+    cloud: &'static ExtractedCloudView,
+    view: &'static ExtractedView,
+    camera: &'static ExtractedCamera,
+    msaa: &'static Msaa,
+    atmosphere: Option<&'static ExtractedAtmosphere>,
+    history: Option<&'static mut CloudHistory>,
+    uniforms: Option<&'static mut CloudUniforms>,
+}
+
+pub(crate) fn prepare_views(
+    mut commands: Commands,
+    mut views: Query<PreparedView>,
+    lights: Query<&ExtractedDirectionalLight>,
+    clouds: Res<ExtractedClouds>,
+    textures: Res<CloudTextureViews>,
+    status: Res<StatusFlags>,
+    device: Res<RenderDevice>,
+    queue: Res<RenderQueue>,
+    mut warned: Local<bevy::platform::collections::HashSet<Entity>>,
+) {
+    let Some(sizes) = texel_sizes(&textures) else { return };
+    let sun = brightest_sun(&lights);
+    for mut item in &mut views {
+        let viewport = item.view.viewport;
+        if viewport.z == 0 || viewport.w == 0 {
+            commands.entity(item.entity).remove::<(CloudHistory, CloudUniforms)>();
+            continue;
+        }
+        let space = space_below(item.view, item.atmosphere, &clouds.settings);
+        if let Some(reason) = refusal(item.view, space.as_ref()) {
+            if warned.insert(item.entity) {
+                warn!("clouds: camera {} shows no clouds: {reason}", item.entity);
+            }
+            commands.entity(item.entity).remove::<(CloudHistory, CloudUniforms)>();
+            continue;
+        }
+        warned.remove(&item.entity);
+        let Some(space) = space else { continue };
+        let (key, pose) = window_state(&item, &clouds, &textures, &space, sun);
+        let mut first = None;
+        let window = match (&mut item.history, status.frames_may_count()) {
+            (Some(history), true) => {
+                history.advance(&device, key, pose);
+                history.frame
+            }
+            (Some(history), false) => {
+                **history = CloudHistory::new(&device, key, pose);
+                history.frame
+            }
+            (None, _) => first.insert(CloudHistory::new(&device, key, pose)).frame,
+        };
+        let frame = FrameUniform::new(&FrameInput {
+            clip_from_view: item.view.clip_from_view,
+            world_from_view: pose.rotation,
+            viewport,
+            space: &space,
+            sun,
+            exposure: item.camera.exposure,
+            quality: &item.cloud.quality,
+            lighting: &clouds.settings.lighting,
+            window,
+        });
+        let model =
+            ModelUniform::new(&clouds.settings.model, clouds.settings.clock.seconds, &space, sizes);
+        let world_from_local = Mat4::from_quat(space.local_from_world.inverse().as_quat());
+        let mut own = None;
+        let uniforms = match &mut item.uniforms {
+            Some(uniforms) => &mut **uniforms,
+            None => own.insert(CloudUniforms::default()),
+        };
+        uniforms.frame.set(frame);
+        uniforms.model.set(model);
+        uniforms.world_from_local.set(world_from_local);
+        uniforms.frame.write_buffer(&device, &queue);
+        uniforms.model.write_buffer(&device, &queue);
+        uniforms.world_from_local.write_buffer(&device, &queue);
+        let mut entity = commands.entity(item.entity);
+        if let Some(history) = first {
+            entity.insert(history);
+        }
+        if let Some(uniforms) = own {
+            entity.insert(uniforms);
+        }
+    }
+}
+
+/// The tangent frame under a view: planet centre from the scene's atmosphere, else a radius below the world's origin.
+fn space_below(
+    view: &ExtractedView,
+    atmosphere: Option<&ExtractedAtmosphere>,
+    settings: &CloudSettings,
+) -> Option<TangentFrame> {
+    let (centre, radius) = match atmosphere {
+        Some(a) => {
+            (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius))
+        }
+        None => (DVec3::new(0.0, -EARTH_RADIUS, 0.0), EARTH_RADIUS),
+    };
+    let camera = view.world_from_view.translation().as_dvec3() + settings.model.world_offset;
+    TangentFrame::below(camera, centre, radius)
+}
+
+fn window_state(
+    item: &PreparedViewItem,
+    clouds: &ExtractedClouds,
+    textures: &CloudTextureViews,
+    space: &TangentFrame,
+    sun: Sun,
+) -> (HistoryKey, Pose) {
+    let quality = &item.cloud.quality;
+    let view = item.view;
+    let model = &clouds.settings.model;
+    let angle = texel_angle(view.clip_from_view, view.viewport, quality);
+    let altitude = space.altitude as f32;
+    let to_shell = (model.bottom - altitude).max(altitude - model.top).max(300.0);
+    let key = HistoryKey {
+        size: marched_size(view.viewport, quality),
+        viewport: view.viewport,
+        window: quality.held_frames(),
+        reset: item.cloud.reset,
+        settings: clouds.version,
+        textures: textures.generation,
+        quality: quality.clone(),
+        atmosphere: item.atmosphere.is_some(),
+        msaa: item.msaa.samples(),
+    };
+    let pose = Pose {
+        clip_from_view: view.clip_from_view,
+        position: view.world_from_view.translation(),
+        rotation: view.world_from_view.rotation(),
+        sun,
+        exposure: item.camera.exposure,
+        seconds: clouds.settings.clock.seconds,
+        drift_limit: 2.0 * angle * to_shell,
+        wind: model.wind.length() + model.evolution.abs(),
+    };
+    (key, pose)
+}
+
+/// Sizes of the bound textures; `None` while one is missing.
+fn texel_sizes(textures: &CloudTextureViews) -> Option<TexelSizes> {
+    let width = |view: &Option<bevy::render::render_resource::TextureView>| {
+        Some(view.as_ref()?.texture().width())
+    };
+    Some(TexelSizes {
+        billow: width(&textures.billow)?,
+        wisp: width(&textures.wisp)?,
+        coverage: width(&textures.coverage)?,
+        type_map: width(&textures.type_map)?,
+    })
+}
+

@@ -1,0 +1,244 @@
+//! Headless apps on the real GPU path, and test shaders run over buffers.
+
+use std::{
+    collections::BTreeSet,
+    path::Path,
+    sync::{
+        Once,
+        atomic::{AtomicU32, Ordering},
+    },
+};
+
+use bevy::{
+    app::{PluginGroupBuilder, Plugins},
+    log::LogPlugin,
+    prelude::*,
+    render::{
+        RenderApp, RenderPlugin,
+        error_handler::{RenderErrorHandler, RenderErrorPolicy},
+        pipelined_rendering::PipelinedRenderingPlugin,
+        render_resource::{
+            BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer, BufferDescriptor,
+            BufferInitDescriptor, BufferUsages, CachedPipelineState, CommandEncoderDescriptor, ComputePassDescriptor,
+            ComputePipeline, ComputePipelineDescriptor, MapMode, Pipeline, PipelineCache, PollType, ShaderStages,
+            binding_types::{storage_buffer_read_only_sized, storage_buffer_sized},
+        },
+        renderer::{RenderDevice, RenderQueue},
+    },
+    shader::{Shader, ShaderCacheError},
+    window::ExitCondition,
+    winit::WinitPlugin,
+};
+
+/// Updates after which a shader that still waits for an import is given up.
+const COMPILE_UPDATES: u32 = 30;
+
+/// Whether the tests run under WebGPU's limits, where Bevy's own `Atmosphere` fails validation.
+pub fn webgpu_limits() -> bool {
+    std::env::var("WGPU_SETTINGS_PRIO").is_ok_and(|priority| priority.eq_ignore_ascii_case("webgpu"))
+}
+
+/// Bevy's plugins without a window, in lock step: one update is one whole frame.
+pub fn headless_plugins() -> PluginGroupBuilder {
+    let plugins = DefaultPlugins
+        .set(WindowPlugin {
+            primary_window: None,
+            exit_condition: ExitCondition::DontExit,
+            ..default()
+        })
+        .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
+        .disable::<WinitPlugin>()
+        .disable::<PipelinedRenderingPlugin>();
+    // The logger is the process's, not the app's.
+    static FIRST: Once = Once::new();
+    let mut first = false;
+    FIRST.call_once(|| first = true);
+    if first {
+        plugins.set(LogPlugin { filter: "warn".to_owned(), ..default() })
+    } else {
+        plugins.disable::<LogPlugin>()
+    }
+}
+
+/// A running app with a renderer, these plugins, and no clouds of its own accord.
+///
+/// # Panics
+/// Where there is no Vulkan device: a GPU test never passes for want of a GPU. Later, on any error that the device reports.
+pub fn app_with<M>(plugins: impl Plugins<M>) -> App {
+    let mut app = App::new();
+    app.add_plugins(headless_plugins()).add_plugins(plugins);
+    app.insert_resource(RenderErrorHandler(|error, _, _| -> RenderErrorPolicy {
+        panic!("the GPU reported {:?}: {}", error.ty, error.description)
+    }));
+    app.finish();
+    app.cleanup();
+    assert!(
+        app.get_sub_app(RenderApp).is_some() && app.world().contains_resource::<RenderDevice>(),
+        "no Vulkan device: GPU tests need one (Mesa's software driver will do)"
+    );
+    app
+}
+
+/// A running app whose only shaders beside Bevy's are this crate's, taken from its sources as they stand.
+///
+/// Any module can be imported by a test shader (`import bevy_cumulus::model::planet::altitude;`).
+pub fn shader_app() -> App {
+    let mut app = app_with(());
+    let source = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut files = BTreeSet::new();
+    wesl_files(&source, &mut files);
+    let mut shaders = app.world_mut().resource_mut::<Assets<Shader>>();
+    for file in files {
+        let text = std::fs::read_to_string(&file).unwrap();
+        let module = file.strip_prefix(&source).unwrap().to_string_lossy().replace('\\', "/");
+        let shader = Shader::from_wesl(text, format!("embedded://bevy_cumulus/{module}"));
+        // Kept for the app's life, as `load_shader_library!` does.
+        std::mem::forget(shaders.add(shader));
+    }
+    app
+}
+
+fn wesl_files(folder: &Path, found: &mut BTreeSet<std::path::PathBuf>) {
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            wesl_files(&path, found);
+        } else if path.extension().is_some_and(|extension| extension == "wesl") {
+            found.insert(path);
+        }
+    }
+}
+
+/// Runs `count` whole frames, the GPU's part included.
+pub fn run_updates(app: &mut App, count: u32) {
+    for _ in 0..count {
+        app.update();
+        wait_for_gpu(app);
+    }
+}
+
+/// Runs frames until `done`; fails after `limit` of them, naming `what` was awaited.
+pub fn run_until(app: &mut App, what: &str, limit: u32, mut done: impl FnMut(&mut App) -> bool) {
+    for _ in 0..limit {
+        if done(app) {
+            return;
+        }
+        run_updates(app, 1);
+    }
+    assert!(done(app), "{what}: not after {limit} frames");
+}
+
+/// Waits until the GPU has done all that was submitted.
+pub fn wait_for_gpu(app: &App) {
+    let device = app.world().resource::<RenderDevice>();
+    device.wgpu_device().poll(PollType::wait_indefinitely()).expect("the GPU stopped answering");
+}
+
+/// Runs a WESL module's `main` (`@compute @workgroup_size(64)`) in one dispatch of at least `invocations` and returns
+/// what it wrote.
+///
+/// Group 0 holds `input` at binding 0 (`var<storage, read>`) and `output_len` zeros at binding 1
+/// (`var<storage, read_write>`), both `array<f32>`. Bevy turns bounds checks off: the shader must not index past the ends.
+///
+/// # Panics
+/// With the compiler's text where the shader does not compile, and on any error that the device reports.
+pub fn run_compute(app: &mut App, wesl: &str, input: &[f32], output_len: usize, invocations: u32) -> Vec<f32> {
+    let layout = BindGroupLayoutDescriptor::new(
+        "test compute",
+        &BindGroupLayoutEntries::sequential(
+            ShaderStages::COMPUTE,
+            (storage_buffer_read_only_sized(false, None), storage_buffer_sized(false, None)),
+        ),
+    );
+    let pipeline = compile(app, wesl, &layout);
+    let result = dispatch(app, &pipeline, &layout, input, output_len, invocations);
+    // Errors of the commands above come out here.
+    app.update();
+    result
+}
+
+fn compile(app: &mut App, wesl: &str, layout: &BindGroupLayoutDescriptor) -> ComputePipeline {
+    static NEXT: AtomicU32 = AtomicU32::new(0);
+    let path = format!("embedded://behaviour/compute_{}.wesl", NEXT.fetch_add(1, Ordering::Relaxed));
+    let shader = Shader::from_wesl(wesl.to_owned(), path);
+    let shader = app.world_mut().resource_mut::<Assets<Shader>>().add(shader);
+    let descriptor = ComputePipelineDescriptor {
+        label: Some("test compute".into()),
+        layout: vec![layout.clone()],
+        shader: shader.clone(),
+        entry_point: Some("main".into()),
+        ..default()
+    };
+    let id = app.sub_app(RenderApp).world().resource::<PipelineCache>().queue_compute_pipeline(descriptor);
+    let mut waiting_for = String::new();
+    for _ in 0..COMPILE_UPDATES {
+        app.update();
+        let cache = app.sub_app(RenderApp).world().resource::<PipelineCache>();
+        match cache.get_compute_pipeline_state(id) {
+            CachedPipelineState::Ok(Pipeline::ComputePipeline(pipeline)) => {
+                let pipeline = pipeline.clone();
+                // Errors of the pipeline's creation come out here.
+                app.update();
+                return pipeline;
+            }
+            CachedPipelineState::Err(
+                error @ (ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable),
+            ) => waiting_for = error.to_string(),
+            CachedPipelineState::Err(error) => panic!("the shader does not compile: {error}\n{wesl}"),
+            _ => {}
+        }
+    }
+    panic!("the shader is not ready after {COMPILE_UPDATES} updates: {waiting_for}\n{wesl}");
+}
+
+fn dispatch(
+    app: &App,
+    pipeline: &ComputePipeline,
+    layout: &BindGroupLayoutDescriptor,
+    input: &[f32],
+    output_len: usize,
+    invocations: u32,
+) -> Vec<f32> {
+    let world = app.sub_app(RenderApp).world();
+    let device = world.resource::<RenderDevice>();
+    let size = (output_len.max(1) * size_of::<f32>()) as u64;
+    let input = device.create_buffer_with_data(&BufferInitDescriptor {
+        label: Some("test input"),
+        contents: bytemuck::cast_slice(if input.is_empty() { &[0.0] } else { input }),
+        usage: BufferUsages::STORAGE,
+    });
+    let buffer = |usage| {
+        device.create_buffer(&BufferDescriptor { label: Some("test output"), size, usage, mapped_at_creation: false })
+    };
+    let output = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
+    let readable = buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
+    let group = device.create_bind_group(
+        "test compute",
+        &world.resource::<PipelineCache>().get_bind_group_layout(layout),
+        &BindGroupEntries::sequential((input.as_entire_binding(), output.as_entire_binding())),
+    );
+    let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
+    {
+        let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
+        pass.set_pipeline(pipeline);
+        pass.set_bind_group(0, &*group, &[]);
+        pass.dispatch_workgroups(invocations.div_ceil(64), 1, 1);
+    }
+    encoder.copy_buffer_to_buffer(&output, 0, &readable, 0, size);
+    world.resource::<RenderQueue>().submit([encoder.finish()]);
+    let mut values = read_mapped(app, &readable);
+    values.truncate(output_len);
+    values
+}
+
+/// The floats in a buffer with usage `MAP_READ`, once the GPU is done with it.
+fn read_mapped(app: &App, buffer: &Buffer) -> Vec<f32> {
+    let slice = buffer.slice(..);
+    slice.map_async(MapMode::Read, |result| result.expect("the buffer cannot be mapped"));
+    wait_for_gpu(app);
+    let mapped = slice.get_mapped_range().expect("the buffer is not mapped");
+    let values = bytemuck::pod_collect_to_vec(&mapped);
+    drop(mapped);
+    buffer.unmap();
+    values
+}
