@@ -30,10 +30,7 @@ pub fn on_planet(arc: f64, direction: f64, altitude: f64) -> (Vec3, Vec3) {
     let drop = 2.0 * (arc / PLANET_RADIUS / 2.0).sin().powi(2);
     let position = [r * sin * side, altitude - r * drop, -r * sin * ahead];
     let normal = [sin * side, cos, -sin * ahead];
-    (
-        Vec3::from(position.map(|v| v as f32)),
-        Vec3::from(normal.map(|v| v as f32)),
-    )
+    (Vec3::from(position.map(|v| v as f32)), Vec3::from(normal.map(|v| v as f32)))
 }
 
 fn mesh() -> Mesh {
@@ -63,31 +60,21 @@ fn mesh() -> Mesh {
             indices.extend([inner + sector, outer + next, outer + sector]);
         }
     }
-    Mesh::new(
-        PrimitiveTopology::TriangleList,
-        RenderAssetUsages::RENDER_WORLD,
-    )
-    .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
-    .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
-    .with_inserted_indices(Indices::U32(indices))
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
+        .with_inserted_indices(Indices::U32(indices))
 }
 
 /// Spawns the ground. It casts no shadow, for it would only fall on itself.
 pub fn spawn(world: &mut World) {
     let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh());
-    let material = world
-        .resource_mut::<Assets<StandardMaterial>>()
-        .add(StandardMaterial {
-            // `CloudLighting::ground_albedo`'s default.
-            base_color: Color::linear_rgb(0.2, 0.2, 0.18),
-            perceptual_roughness: 1.0,
-            reflectance: 0.0,
-            ..default()
-        });
-    world.spawn((
-        Mesh3d(mesh),
-        MeshMaterial3d(material),
-        NotShadowCaster,
-        NoFrustumCulling,
-    ));
+    let material = world.resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial {
+        // `CloudLighting::ground_albedo`'s default.
+        base_color: Color::linear_rgb(0.2, 0.2, 0.18),
+        perceptual_roughness: 1.0,
+        reflectance: 0.0,
+        ..default()
+    });
+    world.spawn((Mesh3d(mesh), MeshMaterial3d(material), NotShadowCaster, NoFrustumCulling));
 }

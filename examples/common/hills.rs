@@ -43,10 +43,7 @@ fn ridges(x: f32, z: f32) -> f32 {
 /// Smooth noise on the unit lattice, 0 to 1.
 fn value_noise(x: f32, z: f32, seed: u32) -> f32 {
     let (cell_x, cell_z) = (x.floor(), z.floor());
-    let (u, v) = (
-        smoothstep(0.0, 1.0, x - cell_x),
-        smoothstep(0.0, 1.0, z - cell_z),
-    );
+    let (u, v) = (smoothstep(0.0, 1.0, x - cell_x), smoothstep(0.0, 1.0, z - cell_z));
     let at = |i: i32, j: i32| hash(cell_x as i32 + i, cell_z as i32 + j, seed);
     let near = at(0, 0) + (at(1, 0) - at(0, 0)) * u;
     let far = at(0, 1) + (at(1, 1) - at(0, 1)) * u;
@@ -71,35 +68,20 @@ fn smoothstep(from: f32, to: f32, x: f32) -> f32 {
 /// The point of the planet's surface at map position x, z, raised by `lift` (m) over the land.
 pub fn on_land(x: f32, z: f32, lift: f32) -> Vec3 {
     let h = altitude(x, z).max(0.0) + lift;
-    on_planet(
-        f64::from(x.hypot(z)),
-        f64::from(x).atan2(f64::from(-z)),
-        f64::from(h),
-    )
-    .0
+    on_planet(f64::from(x.hypot(z)), f64::from(x).atan2(f64::from(-z)), f64::from(h)).0
 }
 
 fn surface(x: f32, z: f32) -> Vec3 {
-    on_planet(
-        f64::from(x.hypot(z)),
-        f64::from(x).atan2(f64::from(-z)),
-        altitude(x, z).into(),
-    )
-    .0
+    on_planet(f64::from(x.hypot(z)), f64::from(x).atan2(f64::from(-z)), altitude(x, z).into()).0
 }
 
 /// Grass below, rock where it is steep, snow on the tops; linear RGB.
 fn colour(altitude: f32, normal: Vec3) -> [f32; 4] {
-    let grass =
-        Vec3::new(0.07, 0.11, 0.03).lerp(Vec3::new(0.2, 0.2, 0.18), smoothstep(8.0, 0.0, altitude));
+    let grass = Vec3::new(0.07, 0.11, 0.03).lerp(Vec3::new(0.2, 0.2, 0.18), smoothstep(8.0, 0.0, altitude));
     let rock = Vec3::new(0.20, 0.18, 0.16);
     let snow = smoothstep(1_350.0, 1_650.0, altitude) * smoothstep(0.6, 0.8, normal.y);
     let bare = smoothstep(0.9, 0.78, normal.y).max(smoothstep(700.0, 1_400.0, altitude));
-    grass
-        .lerp(rock, bare)
-        .lerp(Vec3::splat(0.75), snow)
-        .extend(1.0)
-        .to_array()
+    grass.lerp(rock, bare).lerp(Vec3::splat(0.75), snow).extend(1.0).to_array()
 }
 
 fn mesh() -> Mesh {
@@ -130,25 +112,20 @@ fn mesh() -> Mesh {
             }
         }
     }
-    Mesh::new(
-        PrimitiveTopology::TriangleList,
-        RenderAssetUsages::RENDER_WORLD,
-    )
-    .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
-    .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
-    .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colours)
-    .with_inserted_indices(Indices::U32(indices))
+    Mesh::new(PrimitiveTopology::TriangleList, RenderAssetUsages::RENDER_WORLD)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_POSITION, positions)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_NORMAL, normals)
+        .with_inserted_attribute(Mesh::ATTRIBUTE_COLOR, colours)
+        .with_inserted_indices(Indices::U32(indices))
 }
 
 /// Spawns the hills.
 pub fn spawn(world: &mut World) {
     let mesh = world.resource_mut::<Assets<Mesh>>().add(mesh());
-    let material = world
-        .resource_mut::<Assets<StandardMaterial>>()
-        .add(StandardMaterial {
-            perceptual_roughness: 1.0,
-            reflectance: 0.1,
-            ..default()
-        });
+    let material = world.resource_mut::<Assets<StandardMaterial>>().add(StandardMaterial {
+        perceptual_roughness: 1.0,
+        reflectance: 0.1,
+        ..default()
+    });
     world.spawn((Mesh3d(mesh), MeshMaterial3d(material)));
 }

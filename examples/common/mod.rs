@@ -11,12 +11,13 @@ use bevy::{
     camera::{Exposure, Hdr},
     core_pipeline::tonemapping::Tonemapping,
     light::{
-        Atmosphere, AtmosphereEnvironmentMapLight, CascadeShadowConfigBuilder, SunDisk,
-        atmosphere::ScatteringMedium, light_consts::lux,
+        Atmosphere, AtmosphereEnvironmentMapLight, CascadeShadowConfigBuilder, SunDisk, atmosphere::ScatteringMedium,
+        light_consts::lux,
     },
     pbr::AtmosphereSettings,
     prelude::*,
 };
+use serde::Serialize;
 
 /// Radius of the planet (m): that of Bevy's `Atmosphere::earth`.
 pub const PLANET_RADIUS: f64 = 6_360_000.0;
@@ -83,10 +84,7 @@ pub const SCENES: [Scene; 5] = [
 ];
 
 /// What is drawn where no scene is named: the first scene's view.
-pub const PLAIN: Scene = Scene {
-    name: "",
-    ..SCENES[0]
-};
+pub const PLAIN: Scene = Scene { name: "", ..SCENES[0] };
 
 impl Scene {
     /// The scene of this name, if there is one.
@@ -96,7 +94,7 @@ impl Scene {
 }
 
 /// Where a camera is and looks.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct CameraPose {
     /// Position (m); y is the altitude near the world's origin.
     pub position: Vec3,
@@ -111,21 +109,12 @@ pub struct CameraPose {
 impl CameraPose {
     /// A pose with the default field of view, 60°.
     pub const fn new(x: f32, y: f32, z: f32, yaw: f32, pitch: f32) -> Self {
-        Self {
-            position: Vec3::new(x, y, z),
-            yaw,
-            pitch,
-            fov: 60.0,
-        }
+        Self { position: Vec3::new(x, y, z), yaw, pitch, fov: 60.0 }
     }
 
     /// This pose as a transform.
     pub fn transform(&self) -> Transform {
-        Transform {
-            translation: self.position,
-            rotation: heading(self.yaw, self.pitch),
-            scale: Vec3::ONE,
-        }
+        Transform { translation: self.position, rotation: heading(self.yaw, self.pitch), scale: Vec3::ONE }
     }
 
     /// The projection with this pose's field of view. Only culling reads `far`: depth is infinite.
@@ -155,15 +144,12 @@ impl FromStr for CameraPose {
         within("z", z, -1.0e8, 1.0e8)?;
         within("pitch", pitch, -90.0, 90.0)?;
         within("fov", fov, 0.1, 170.0)?;
-        Ok(Self {
-            fov,
-            ..Self::new(x, y, z, yaw, pitch)
-        })
+        Ok(Self { fov, ..Self::new(x, y, z, yaw, pitch) })
     }
 }
 
 /// Where the sun stands.
-#[derive(Clone, Copy, PartialEq, Debug)]
+#[derive(Clone, Copy, PartialEq, Debug, Serialize)]
 pub struct SunPose {
     /// Angle above the horizon (degrees).
     pub elevation: f32,
@@ -187,11 +173,7 @@ impl SunPose {
     /// 5 at the end of twilight.
     pub fn ev100(&self) -> f32 {
         let t = self.elevation;
-        if t >= 0.0 {
-            10.5 + 3.5 * (t / 25.0).min(1.0)
-        } else {
-            (10.5 + t * 0.45).max(5.0)
-        }
+        if t >= 0.0 { 10.5 + 3.5 * (t / 25.0).min(1.0) } else { (10.5 + t * 0.45).max(5.0) }
     }
 }
 
@@ -214,9 +196,7 @@ fn heading(yaw: f32, pitch: f32) -> Quat {
 fn numbers(text: &str, what: &str) -> Result<Vec<f32>, String> {
     let number = |part: &str| match part.trim().parse::<f32>() {
         Ok(n) if n.is_finite() => Ok(n),
-        _ => Err(format!(
-            "expected {what}, but {part:?} is not a finite number"
-        )),
+        _ => Err(format!("expected {what}, but {part:?} is not a finite number")),
     };
     text.split(',').map(number).collect()
 }
@@ -224,18 +204,14 @@ fn numbers(text: &str, what: &str) -> Result<Vec<f32>, String> {
 /// Exactly `N` finite numbers in `a,b,c`; `what` names them in errors.
 pub fn exactly<const N: usize>(text: &str, what: &str) -> Result<[f32; N], String> {
     let found = numbers(text, what)?;
-    found
-        .try_into()
-        .map_err(|found: Vec<f32>| format!("expected {what}, found {} numbers", found.len()))
+    found.try_into().map_err(|found: Vec<f32>| format!("expected {what}, found {} numbers", found.len()))
 }
 
 fn within(name: &str, value: f32, min: f32, max: f32) -> Result<(), String> {
     if (min..=max).contains(&value) {
         Ok(())
     } else {
-        Err(format!(
-            "{name} = {value} is outside its range {min} to {max}"
-        ))
+        Err(format!("{name} = {value} is outside its range {min} to {max}"))
     }
 }
 
@@ -259,10 +235,7 @@ pub fn spawn_sky(world: &mut World, sun: SunPose, sky: bool, shadows: bool) -> E
     world.insert_resource(if sky {
         GlobalAmbientLight::NONE
     } else {
-        GlobalAmbientLight {
-            brightness: 1500.0,
-            ..default()
-        }
+        GlobalAmbientLight { brightness: 1500.0, ..default() }
     });
     let cascades = CascadeShadowConfigBuilder {
         num_cascades: 3,
@@ -272,35 +245,21 @@ pub fn spawn_sky(world: &mut World, sun: SunPose, sky: bool, shadows: bool) -> E
         ..default()
     };
     let light = DirectionalLight {
-        illuminance: if sky {
-            lux::RAW_SUNLIGHT
-        } else {
-            lux::FULL_DAYLIGHT
-        },
+        illuminance: if sky { lux::RAW_SUNLIGHT } else { lux::FULL_DAYLIGHT },
         shadow_maps_enabled: shadows,
         ..default()
     };
-    world
-        .spawn((light, SunDisk::EARTH, cascades.build(), sun.transform()))
-        .id()
+    world.spawn((light, SunDisk::EARTH, cascades.build(), sun.transform())).id()
 }
 
 /// The parts of a camera that the pictures have in common; target, pose and clouds come with the example.
 pub fn camera(ev100: f32) -> impl Bundle {
-    (
-        Camera3d::default(),
-        Hdr,
-        Exposure { ev100 },
-        Tonemapping::AcesFitted,
-    )
+    (Camera3d::default(), Hdr, Exposure { ev100 }, Tonemapping::AcesFitted)
 }
 
 /// The parts of a camera that need Bevy's atmosphere.
 pub fn sky_camera() -> impl Bundle {
     // Aerial perspective as far as clouds are seen, not only to Bevy's 32 km.
-    let settings = AtmosphereSettings {
-        aerial_view_lut_max_distance: 100_000.0,
-        ..default()
-    };
+    let settings = AtmosphereSettings { aerial_view_lut_max_distance: 100_000.0, ..default() };
     (settings, AtmosphereEnvironmentMapLight::default())
 }

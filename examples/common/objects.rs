@@ -23,24 +23,10 @@ const BALLOONS: [(f32, f32, f32, f32); 4] = [
 ];
 
 /// The line of pylons: from, to (map positions, m), count and height (m).
-const PYLONS: (Vec2, Vec2, u32, f32) = (
-    Vec2::new(170.0, -350.0),
-    Vec2::new(-700.0, -6_000.0),
-    14,
-    75.0,
-);
+const PYLONS: (Vec2, Vec2, u32, f32) = (Vec2::new(170.0, -350.0), Vec2::new(-700.0, -6_000.0), 14, 75.0);
 
-fn put(
-    world: &mut World,
-    mesh: &Handle<Mesh>,
-    material: &Handle<StandardMaterial>,
-    transform: Transform,
-) {
-    world.spawn((
-        Mesh3d(mesh.clone()),
-        MeshMaterial3d(material.clone()),
-        transform,
-    ));
+fn put(world: &mut World, mesh: &Handle<Mesh>, material: &Handle<StandardMaterial>, transform: Transform) {
+    world.spawn((Mesh3d(mesh.clone()), MeshMaterial3d(material.clone()), transform));
 }
 
 /// Spawns towers, balloons and pylons.
@@ -64,34 +50,22 @@ pub fn spawn(world: &mut World) {
         // Sunk a little, since land under a wide foot is not level.
         let centre = on_land(x, z, height / 2.0 - 30.0);
         let size = Vec3::new(width, height + 60.0, width);
-        let turned = Transform::from_translation(centre)
-            .with_rotation(Quat::from_rotation_y(0.5 + i as f32))
-            .with_scale(size);
+        let turned =
+            Transform::from_translation(centre).with_rotation(Quat::from_rotation_y(0.5 + i as f32)).with_scale(size);
         put(world, &cuboid, &concrete, turned);
     }
     for (i, (x, z, lift, radius)) in BALLOONS.into_iter().enumerate() {
-        let place =
-            Transform::from_translation(on_land(x, z, lift)).with_scale(Vec3::splat(radius));
+        let place = Transform::from_translation(on_land(x, z, lift)).with_scale(Vec3::splat(radius));
         put(world, &ball, if i % 2 == 0 { &red } else { &white }, place);
     }
     let (from, to, count, height) = PYLONS;
     for i in 0..count {
         let at = from.lerp(to, i as f32 / (count - 1) as f32);
         let mast = Transform::from_translation(on_land(at.x, at.y, height / 2.0 - 5.0));
-        put(
-            world,
-            &cuboid,
-            &steel,
-            mast.with_scale(Vec3::new(3.0, height + 10.0, 3.0)),
-        );
+        put(world, &cuboid, &steel, mast.with_scale(Vec3::new(3.0, height + 10.0, 3.0)));
         for (lift, width) in [(0.72, 26.0), (0.92, 18.0)] {
             let arm = Transform::from_translation(on_land(at.x, at.y, height * lift));
-            put(
-                world,
-                &cuboid,
-                &steel,
-                arm.with_scale(Vec3::new(width, 1.5, 1.5)),
-            );
+            put(world, &cuboid, &steel, arm.with_scale(Vec3::new(width, 1.5, 1.5)));
         }
     }
 }

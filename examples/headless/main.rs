@@ -6,7 +6,6 @@
 mod common;
 mod options;
 mod output;
-mod shim;
 mod shoot;
 mod status;
 mod timings;
@@ -18,7 +17,7 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use crate::shim::prelude::*;
+use bevy_cumulus::prelude::*;
 use anyhow::{Context as _, Result, anyhow, bail};
 use clap::Parser as _;
 use options::Options;
@@ -58,13 +57,8 @@ fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     let said = Arc::new(Mutex::new(None));
     let hear = said.clone();
     std::panic::set_hook(Box::new(move |info| {
-        let text = info
-            .payload_as_str()
-            .unwrap_or("no reason given")
-            .to_owned();
-        let place = info
-            .location()
-            .map_or_else(String::new, |at| format!(" ({}:{})", at.file(), at.line()));
+        let text = info.payload_as_str().unwrap_or("no reason given").to_owned();
+        let place = info.location().map_or_else(String::new, |at| format!(" ({}:{})", at.file(), at.line()));
         if let Ok(mut said) = hear.lock() {
             // The first one is the cause of those that follow.
             said.get_or_insert(format!("{text}{place}"));
@@ -74,10 +68,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     drop(std::panic::take_hook());
     result.unwrap_or_else(|_| {
         let said = said.lock().ok().and_then(|mut said| said.take());
-        Err(anyhow!(
-            "the engine gave up: {}",
-            said.as_deref().unwrap_or("no reason given")
-        ))
+        Err(anyhow!("the engine gave up: {}", said.as_deref().unwrap_or("no reason given")))
     })
 }
 
@@ -86,10 +77,7 @@ fn list() -> std::io::Result<()> {
     let scenes = common::SCENES.iter().map(|scene| scene.name.to_owned());
     let presets = CloudPreset::names().map(str::to_owned);
     let mut out = std::io::stdout().lock();
-    for name in scenes
-        .chain(presets)
-        .chain(CloudSettings::default().paths())
-    {
+    for name in scenes.chain(presets).chain(CloudSettings::default().paths()) {
         writeln!(out, "{name}")?;
     }
     out.flush()

@@ -2,11 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::shim::prelude::*;
+use bevy_cumulus::prelude::*;
 use anyhow::{Context as _, Result, anyhow, bail};
 use bevy::math::Vec3;
 use clap::Parser;
-use serde_json::json;
+use serde::Serialize;
 
 use crate::common::{CameraPose, PLAIN, SCENES, Scene, SunPose, exactly};
 
@@ -79,9 +79,7 @@ pub struct Options {
 
 fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |part: &str| part.parse().ok().filter(|n| (1..=8192).contains(n));
-    let sides = text
-        .split_once('x')
-        .and_then(|(w, h)| Some((side(w)?, side(h)?)));
+    let sides = text.split_once('x').and_then(|(w, h)| Some((side(w)?, side(h)?)));
     sides.ok_or_else(|| "expected WxH, such as 480x270, with sides from 1 to 8192".to_owned())
 }
 
@@ -92,9 +90,7 @@ fn finite(text: &str) -> Result<f64, String> {
 
 fn ev100(text: &str) -> Result<f32, String> {
     let number = finite(text).ok().filter(|n| (-10.0..=30.0).contains(n));
-    number
-        .map(|n| n as f32)
-        .ok_or_else(|| "expected a number from -10 to 30".to_owned())
+    number.map(|n| n as f32).ok_or_else(|| "expected a number from -10 to 30".to_owned())
 }
 
 /// What is to be rendered, with every default filled in and every value checked.
@@ -127,10 +123,7 @@ impl Options {
         // A scene has its sun; where there is none, the preset's advice is taken.
         let advised = preset.sun_elevation.filter(|_| scene.is_none());
         let elevation = advised.unwrap_or(base.sun.elevation);
-        let sun = self.sun.unwrap_or(SunPose {
-            elevation,
-            ..base.sun
-        });
+        let sun = self.sun.unwrap_or(SunPose { elevation, ..base.sun });
         Ok(Plan {
             settings: self.settings(preset)?,
             preset: preset_name.to_owned(),
@@ -166,12 +159,10 @@ impl Options {
         settings.clock.seconds = self.time.unwrap_or(0.0);
         settings.validate().context("--time")?;
         for text in &self.sets {
-            let (path, value) = text.split_once('=').ok_or_else(|| {
-                anyhow!("--set {text}: expected PATH=VALUE, such as model.coverage=0.2")
-            })?;
-            settings
-                .set(path.trim(), value)
-                .with_context(|| format!("--set {text}"))?;
+            let (path, value) = text
+                .split_once('=')
+                .ok_or_else(|| anyhow!("--set {text}: expected PATH=VALUE, such as model.coverage=0.2"))?;
+            settings.set(path.trim(), value).with_context(|| format!("--set {text}"))?;
         }
         settings.validate().context("--set")?;
         Ok(settings)
@@ -215,10 +206,7 @@ impl Plan {
     /// The sun of the counted frame `k`, from 0.
     pub fn sun(&self, k: u32) -> SunPose {
         let [elevation, azimuth] = self.sun_move.map(|d| d * k as f32);
-        SunPose {
-            elevation: self.sun.elevation + elevation,
-            azimuth: self.sun.azimuth + azimuth,
-        }
+        SunPose { elevation: self.sun.elevation + elevation, azimuth: self.sun.azimuth + azimuth }
     }
 
     /// The cloud clock of the counted frame `k`, from 0 (s).
@@ -229,36 +217,51 @@ impl Plan {
 
     /// The files asked for: option, path and extension.
     pub fn files(&self) -> Vec<(&'static str, &Path, &'static str)> {
-        let all = [
-            ("--out", &self.out, "png"),
-            ("--cloud", &self.cloud, "exr"),
-            ("--timings", &self.timings, "json"),
-        ];
-        all.into_iter()
-            .filter_map(|(option, path, kind)| Some((option, path.as_deref()?, kind)))
-            .collect()
+        let all = [("--out", &self.out, "png"), ("--cloud", &self.cloud, "exr"), ("--timings", &self.timings, "json")];
+        all.into_iter().filter_map(|(option, path, kind)| Some((option, path.as_deref()?, kind))).collect()
     }
 
     /// Everything that decides the picture, for the timings file.
-    pub fn to_json(&self) -> serde_json::Value {
-        let pose = |c: &CameraPose| json!({ "position": c.position.to_array(), "yaw": c.yaw, "pitch": c.pitch, "fov": c.fov });
-        json!({
-            "model": self.settings.model,
-            "lighting": self.settings.lighting,
-            "quality": self.settings.quality,
-            "textures": self.settings.textures,
-            "clock": self.settings.clock,
-            "camera": pose(&self.camera),
-            "move": self.travel,
-            "sun": { "elevation": self.sun.elevation, "azimuth": self.sun.azimuth },
-            "sun_move": self.sun_move,
-            "dt": self.dt,
-            "frames": self.frames,
-            "sky": self.sky,
-            "msaa": self.msaa,
-            "ev100": self.ev100,
-            "scene": self.scene.map(|scene| scene.name),
-            "preset": self.preset,
-        })
+    pub fn effective(&self) -> Effective<'_> {
+        Effective {
+            model: &self.settings.model,
+            lighting: &self.settings.lighting,
+            quality: &self.settings.quality,
+            textures: &self.settings.textures,
+            clock: &self.settings.clock,
+            camera: self.camera,
+            travel: self.travel,
+            sun: self.sun,
+            sun_move: self.sun_move,
+            dt: self.dt,
+            frames: self.frames,
+            sky: self.sky,
+            msaa: self.msaa,
+            ev100: self.ev100,
+            scene: self.scene.map(|scene| scene.name),
+            preset: &self.preset,
+        }
     }
+}
+
+/// What was rendered; camera, sun and clock are those of the first frame.
+#[derive(Serialize)]
+pub struct Effective<'a> {
+    model: &'a CloudModel,
+    lighting: &'a CloudLighting,
+    quality: &'a CloudQuality,
+    textures: &'a CloudTextures,
+    clock: &'a CloudClock,
+    camera: CameraPose,
+    #[serde(rename = "move")]
+    travel: [f32; 5],
+    sun: SunPose,
+    sun_move: [f32; 2],
+    dt: f64,
+    frames: u32,
+    sky: bool,
+    msaa: u32,
+    ev100: f32,
+    scene: Option<&'static str>,
+    preset: &'a str,
 }

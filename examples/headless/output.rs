@@ -8,40 +8,38 @@ use std::{
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
 use image::{DynamicImage, ImageFormat, Rgba32FImage};
-use serde_json::json;
+use serde::Serialize;
+use serde_json::Value;
 
-use crate::{options::Plan, shoot::Shot};
+use crate::{
+    options::{Effective, Plan},
+    shoot::Shot,
+};
+
+/// The timings file. A struct, since JSON values would widen every f32.
+#[derive(Serialize)]
+struct Report<'a> {
+    adapter: &'a str,
+    size: (u32, u32),
+    settings: Effective<'a>,
+    passes: Value,
+    frame: Value,
+}
 
 /// Says before the work whether the file can be written after it.
 pub fn check(path: &Path, extension: &str) -> Result<()> {
     let shown = path.display();
-    ensure!(
-        !path.as_os_str().is_empty(),
-        "the name of the file is empty"
-    );
+    ensure!(!path.as_os_str().is_empty(), "the name of the file is empty");
     ensure!(!path.is_dir(), "{shown} is a directory");
     if let Some(found) = path.extension() {
-        ensure!(
-            found.eq_ignore_ascii_case(extension),
-            "{shown}: the file is a .{extension}, so its name must end so"
-        );
+        ensure!(found.eq_ignore_ascii_case(extension), "{shown}: the file is a .{extension}, so its name must end so");
     }
-    let folder = path
-        .parent()
-        .filter(|folder| !folder.as_os_str().is_empty());
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     if let Some(folder) = folder {
-        ensure!(
-            folder.is_dir(),
-            "{shown}: there is no directory {}",
-            folder.display()
-        );
+        ensure!(folder.is_dir(), "{shown}: there is no directory {}", folder.display());
     }
     let existed = path.exists();
-    OpenOptions::new()
-        .append(true)
-        .create(true)
-        .open(path)
-        .with_context(|| format!("cannot write {shown}"))?;
+    OpenOptions::new().append(true).create(true).open(path).with_context(|| format!("cannot write {shown}"))?;
     if !existed {
         fs::remove_file(path).with_context(|| format!("cannot write {shown}"))?;
     }
@@ -51,35 +49,18 @@ pub fn check(path: &Path, extension: &str) -> Result<()> {
 /// Writes all that was asked for; then says whether it holds what it should.
 pub fn write(plan: &Plan, shot: &Shot) -> Result<()> {
     if let Some(path) = &plan.out {
-        let picture = shot
-            .picture
-            .as_ref()
-            .ok_or_else(|| anyhow!("--out: no picture came back"))?;
-        put(
-            path,
-            &encode(&DynamicImage::ImageRgb8(picture.clone()), ImageFormat::Png)?,
-        )?;
+        let picture = shot.picture.as_ref().ok_or_else(|| anyhow!("--out: no picture came back"))?;
+        put(path, &encode(&DynamicImage::ImageRgb8(picture.clone()), ImageFormat::Png)?)?;
     }
     let cloud = shot.cloud.as_ref();
     if let Some(path) = &plan.cloud {
         let cloud = cloud.ok_or_else(|| anyhow!("--cloud: no cloud buffer came back"))?;
-        put(
-            path,
-            &encode(
-                &DynamicImage::ImageRgba32F(cloud.clone()),
-                ImageFormat::OpenExr,
-            )?,
-        )?;
+        put(path, &encode(&DynamicImage::ImageRgba32F(cloud.clone()), ImageFormat::OpenExr)?)?;
     }
     if let Some(path) = &plan.timings {
         let (passes, frame) = shot.timings.to_json();
-        let all = json!({
-            "adapter": shot.adapter,
-            "size": [plan.size.0, plan.size.1],
-            "settings": plan.to_json(),
-            "passes": passes,
-            "frame": frame,
-        });
+        let settings = plan.effective();
+        let all = Report { adapter: &shot.adapter, size: plan.size, settings, passes, frame };
         put(path, serde_json::to_string_pretty(&all)?.as_bytes())?;
     }
     cloud.map_or(Ok(()), finite)
@@ -87,9 +68,7 @@ pub fn write(plan: &Plan, shot: &Shot) -> Result<()> {
 
 fn encode(image: &DynamicImage, format: ImageFormat) -> Result<Vec<u8>> {
     let mut bytes = Cursor::new(Vec::new());
-    image
-        .write_to(&mut bytes, format)
-        .with_context(|| format!("cannot encode {format:?}"))?;
+    image.write_to(&mut bytes, format).with_context(|| format!("cannot encode {format:?}"))?;
     Ok(bytes.into_inner())
 }
 
@@ -102,10 +81,7 @@ fn finite(cloud: &Rgba32FImage) -> Result<()> {
     let bad = |p: &image::Rgba<f32>| p.0.iter().any(|v| !v.is_finite());
     let count = cloud.pixels().filter(|p| bad(p)).count();
     if let Some((x, y, pixel)) = cloud.enumerate_pixels().find(|(_, _, p)| bad(p)) {
-        bail!(
-            "the cloud buffer is not finite in {count} pixels, the first at {x},{y}: {:?}",
-            pixel.0
-        );
+        bail!("the cloud buffer is not finite in {count} pixels, the first at {x},{y}: {:?}", pixel.0);
     }
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use std::time::{Duration, Instant};
 
-use crate::shim::{CloudBuffer, CloudStatus, prelude::*, textures::CloudTextureStatus};
+use bevy_cumulus::{CloudBuffer, CloudStatus, prelude::*, textures::CloudTextureStatus};
 use anyhow::{Result, anyhow, bail, ensure};
 use bevy::{
     camera::RenderTarget,
@@ -85,24 +85,14 @@ fn engine(plan: &Plan) -> App {
                 filter: "wgpu=error,naga=error,bevy_render::renderer=error".into(),
                 ..default()
             })
-            .set(WindowPlugin {
-                primary_window: None,
-                exit_condition: ExitCondition::DontExit,
-                ..default()
-            })
-            .set(RenderPlugin {
-                render_creation: gpu.into(),
-                synchronous_pipeline_compilation: true,
-                ..default()
-            })
+            .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+            .set(RenderPlugin { render_creation: gpu.into(), synchronous_pipeline_compilation: true, ..default() })
             .disable::<bevy::app::PanicHandlerPlugin>()
             .disable::<WinitPlugin>()
             .disable::<PipelinedRenderingPlugin>(),
     )
     .add_plugins((RenderDiagnosticsPlugin, CloudsPlugin))
-    .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(
-        Plan::FRAME_SECONDS,
-    )))
+    .insert_resource(TimeUpdateStrategy::ManualDuration(Duration::from_secs_f64(Plan::FRAME_SECONDS)))
     .init_resource::<Caught>();
     app.finish();
     app.cleanup();
@@ -119,44 +109,22 @@ impl Studio {
         world.insert_resource(settings.quality);
         world.insert_resource(settings.textures);
         // The clock is set before every frame instead, so it has no speed of its own.
-        world.insert_resource(CloudClock {
-            speed: 0.0,
-            ..settings.clock
-        });
+        world.insert_resource(CloudClock { speed: 0.0, ..settings.clock });
 
         let (width, height) = plan.size;
-        let limit = world
-            .resource::<RenderDevice>()
-            .limits()
-            .max_texture_dimension_2d;
-        ensure!(
-            width.max(height) <= limit,
-            "--size {width}x{height}: this device makes at most {limit} pixels a side"
-        );
+        let limit = world.resource::<RenderDevice>().limits().max_texture_dimension_2d;
+        ensure!(width.max(height) <= limit, "--size {width}x{height}: this device makes at most {limit} pixels a side");
         let hills = plan.scene.is_some_and(|scene| scene.hills);
         common::spawn_land(world, hills);
         let sun = common::spawn_sky(world, plan.sun(0), plan.sky, hills);
 
         let mut images = world.resource_mut::<Assets<Image>>();
-        let target = images.add(Image::new_target_texture(
-            width,
-            height,
-            TextureFormat::Rgba8UnormSrgb,
-            None,
-        ));
+        let target = images.add(Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None));
         let wanted = plan.out.is_some() || plan.cloud.is_some();
         let buffer = wanted.then(|| images.add(CloudBuffer::image(width, height)));
         let camera = world
-            .spawn((
-                common::camera(plan.ev100),
-                CloudView::default(),
-                RenderTarget::from(target.clone()),
-            ))
-            .insert(if plan.msaa == 4 {
-                Msaa::Sample4
-            } else {
-                Msaa::Off
-            })
+            .spawn((common::camera(plan.ev100), CloudView::default(), RenderTarget::from(target.clone())))
+            .insert(if plan.msaa == 4 { Msaa::Sample4 } else { Msaa::Off })
             .id();
         if plan.sky {
             world.entity_mut(camera).insert(common::sky_camera());
@@ -164,13 +132,7 @@ impl Studio {
         if let Some(buffer) = &buffer {
             world.entity_mut(camera).insert(CloudBuffer(buffer.clone()));
         }
-        let mut studio = Self {
-            app,
-            camera,
-            sun,
-            target,
-            buffer,
-        };
+        let mut studio = Self { app, camera, sun, target, buffer };
         studio.pose(plan, 0);
         Ok(studio)
     }
@@ -180,9 +142,7 @@ impl Studio {
         let (pose, sun) = (plan.camera(k), plan.sun(k).transform());
         let aspect = plan.size.0 as f32 / plan.size.1 as f32;
         let world = self.app.world_mut();
-        world
-            .entity_mut(self.camera)
-            .insert((pose.transform(), pose.projection(aspect)));
+        world.entity_mut(self.camera).insert((pose.transform(), pose.projection(aspect)));
         world.entity_mut(self.sun).insert(sun);
         world.resource_mut::<CloudClock>().seconds = plan.seconds(k);
     }
@@ -194,13 +154,8 @@ impl Studio {
             bail!("the engine stopped rendering; the lines above say why");
         }
         let device = self.app.world().resource::<RenderDevice>().wgpu_device();
-        let wait = PollType::Wait {
-            submission_index: None,
-            timeout: None,
-        };
-        device
-            .poll(wait)
-            .map_err(|error| anyhow!("waiting for the GPU: {error}"))?;
+        let wait = PollType::Wait { submission_index: None, timeout: None };
+        device.poll(wait).map_err(|error| anyhow!("waiting for the GPU: {error}"))?;
         Ok(())
     }
 
@@ -210,9 +165,7 @@ impl Studio {
         let stage = Stage::begin("baking textures", 100);
         // Thrown away: it has the screenshot's own pipeline made before frames are timed.
         if plan.out.is_some() {
-            self.app
-                .world_mut()
-                .spawn(Screenshot::image(self.target.clone()));
+            self.app.world_mut().spawn(Screenshot::image(self.target.clone()));
         }
         let mut settled = 0;
         while settled < SETTLING_FRAMES {
@@ -227,13 +180,10 @@ impl Studio {
             if let Some(reason) = status.unsupported() {
                 bail!("clouds cannot be drawn on this device: {reason}");
             }
-            let ready = status.is_ready();
+            let drawn = status.is_ready();
             stage.at((world.resource::<CloudTextureStatus>().progress * 100.0) as u64);
-            settled = if ready && self.pipelines_made()? {
-                settled + 1
-            } else {
-                0
-            };
+            let made = self.pipelines_made()?;
+            settled = if drawn && made { settled + 1 } else { 0 };
         }
         Ok(())
     }
@@ -243,9 +193,7 @@ impl Studio {
     /// # Errors
     /// A pipeline failed: its shader does not compile or the device refused it.
     fn pipelines_made(&self) -> Result<bool> {
-        let Some(render) = self.app.get_sub_app(RenderApp) else {
-            bail!("the renderer did not start")
-        };
+        let Some(render) = self.app.get_sub_app(RenderApp) else { bail!("the renderer did not start") };
         let cache = render.world().resource::<PipelineCache>();
         let waiting: Vec<_> = cache.waiting_pipelines().collect();
         for (id, pipeline) in cache.pipelines().enumerate() {
@@ -319,8 +267,7 @@ impl Studio {
 
     fn is_back(&self, plan: &Plan) -> bool {
         let caught = self.app.world().resource::<Caught>();
-        (plan.out.is_none() || caught.picture.is_some())
-            && (self.buffer.is_none() || caught.cloud.is_some())
+        (plan.out.is_none() || caught.picture.is_some()) && (self.buffer.is_none() || caught.cloud.is_some())
     }
 
     fn shot(mut self, plan: &Plan, timings: Timings) -> Result<Shot> {
@@ -328,18 +275,10 @@ impl Studio {
         let caught = std::mem::take(&mut *world.resource_mut::<Caught>());
         let picture = caught.picture.map(Image::try_into_dynamic).transpose();
         let picture = picture.map_err(|error| anyhow!("the picture: {error}"))?;
-        let cloud = caught
-            .cloud
-            .map(|bytes| cloud_image(plan.size, &bytes))
-            .transpose()?;
+        let cloud = caught.cloud.map(|bytes| cloud_image(plan.size, &bytes)).transpose()?;
         let info = world.resource::<RenderAdapterInfo>();
         let adapter = format!("{} ({:?})", info.name, info.backend);
-        Ok(Shot {
-            picture: picture.map(|picture| picture.to_rgb8()),
-            cloud,
-            timings,
-            adapter,
-        })
+        Ok(Shot { picture: picture.map(|picture| picture.to_rgb8()), cloud, timings, adapter })
     }
 }
 
@@ -357,10 +296,6 @@ fn cloud_image((width, height): (u32, u32), bytes: &[u8]) -> Result<Rgba32FImage
         .iter()
         .map(|b| f32::from_le_bytes(*b))
         .collect();
-    Rgba32FImage::from_raw(width, height, values).ok_or_else(|| {
-        anyhow!(
-            "the cloud buffer came back with {} bytes, too few for {width}x{height}",
-            bytes.len()
-        )
-    })
+    Rgba32FImage::from_raw(width, height, values)
+        .ok_or_else(|| anyhow!("the cloud buffer came back with {} bytes, too few for {width}x{height}", bytes.len()))
 }

@@ -19,8 +19,7 @@ impl Stage {
             return Self(ProgressBar::hidden());
         }
         let style = ProgressStyle::with_template("{msg:24} {bar:32} {pos}/{len} {elapsed}");
-        let bar = ProgressBar::new(steps)
-            .with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let bar = ProgressBar::new(steps).with_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
         bar.set_message(what);
         bar.enable_steady_tick(Duration::from_millis(200));
         Self(bar)

@@ -6,12 +6,7 @@ use bevy::{diagnostic::DiagnosticsStore, prelude::*};
 use serde_json::{Value, json};
 
 /// The passes of the clouds; listed even where the device has no timestamps.
-const CLOUD_PASSES: [&str; 4] = [
-    "cloud_sky",
-    "cloud_march",
-    "cloud_accumulate",
-    "cloud_composite",
-];
+const CLOUD_PASSES: [&str; 4] = ["cloud_sky", "cloud_march", "cloud_accumulate", "cloud_composite"];
 
 /// Updates from the one that renders a frame to the one that publishes its GPU times: the query buffer is read when
 /// the next frame begins, and stored at the start of the one after (`bevy_render/diagnostic/internal.rs`). That holds
@@ -36,33 +31,21 @@ impl Timings {
     pub fn take_passes(&mut self, store: &DiagnosticsStore, keep: bool) {
         for diagnostic in store.iter() {
             let path = diagnostic.path().as_str();
-            let name = path
-                .strip_prefix("render/")
-                .and_then(|path| path.strip_suffix("/elapsed_gpu"));
+            let name = path.strip_prefix("render/").and_then(|path| path.strip_suffix("/elapsed_gpu"));
             let (Some(name), Some(newest)) = (name, diagnostic.measurement()) else {
                 continue;
             };
             let seen = self.last_seen.insert(name.to_owned(), newest.time);
             if keep && seen != Some(newest.time) {
-                self.passes
-                    .entry(name.to_owned())
-                    .or_default()
-                    .push(newest.value);
+                self.passes.entry(name.to_owned()).or_default().push(newest.value);
             }
         }
     }
 
     /// `{"passes": {name: {median, min, max} or null}, "frame": {median, min, max}}`, in ms.
     pub fn to_json(&self) -> (Value, Value) {
-        let mut passes: BTreeMap<&str, Value> = CLOUD_PASSES
-            .into_iter()
-            .map(|name| (name, Value::Null))
-            .collect();
-        passes.extend(
-            self.passes
-                .iter()
-                .map(|(name, times)| (name.as_str(), spread(times))),
-        );
+        let mut passes: BTreeMap<&str, Value> = CLOUD_PASSES.into_iter().map(|name| (name, Value::Null)).collect();
+        passes.extend(self.passes.iter().map(|(name, times)| (name.as_str(), spread(times))));
         (json!(passes), spread(&self.frames))
     }
 }
@@ -74,10 +57,6 @@ fn spread(times: &[f64]) -> Value {
         return Value::Null;
     };
     let middle = sorted.len() / 2;
-    let median = if sorted.len() % 2 == 1 {
-        sorted[middle]
-    } else {
-        (sorted[middle - 1] + sorted[middle]) / 2.0
-    };
+    let median = if sorted.len() % 2 == 1 { sorted[middle] } else { (sorted[middle - 1] + sorted[middle]) / 2.0 };
     json!({ "median": median, "min": min, "max": max })
 }

@@ -24,7 +24,8 @@ pub fn hg(g: f64, cos_theta: f64) -> f64 {
 ///
 /// `alpha` = 0 is Henyey–Greenstein, 1 is Cornette–Shanks, and 1 with `g` = 0 is Rayleigh.
 pub fn draine(g: f64, alpha: f64, cos_theta: f64) -> f64 {
-    hg(g, cos_theta) * (1.0 + alpha * cos_theta * cos_theta) / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0)
+    hg(g, cos_theta) * (1.0 + alpha * cos_theta * cos_theta)
+        / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0)
 }
 
 /// `(1 − mix)·HG(g) + mix·HG(g_back)`, with `mix` in 0..=1.
@@ -109,13 +110,17 @@ impl Phase {
     pub fn from_settings(lighting: &CloudLighting) -> Result<Self, SettingsError> {
         Ok(match lighting.phase {
             PhaseFunction::Isotropic => Self::Isotropic,
-            PhaseFunction::HenyeyGreenstein => Self::HenyeyGreenstein { g: lighting.g.into() },
+            PhaseFunction::HenyeyGreenstein => Self::HenyeyGreenstein {
+                g: lighting.g.into(),
+            },
             PhaseFunction::TwoLobe => Self::TwoLobe {
                 g: lighting.g.into(),
                 g_back: lighting.g_back.into(),
                 mix: lighting.lobe_mix.into(),
             },
-            PhaseFunction::HgDraine => Self::HgDraine(HgDraine::from_diameter(lighting.droplet_diameter.into())?),
+            PhaseFunction::HgDraine => {
+                Self::HgDraine(HgDraine::from_diameter(lighting.droplet_diameter.into())?)
+            }
         })
     }
 
@@ -127,9 +132,18 @@ impl Phase {
             Self::Isotropic => isotropic(),
             Self::HenyeyGreenstein { g } => hg(c * g, cos_theta),
             Self::TwoLobe { g, g_back, mix } => two_lobe(c * g, c * g_back, mix, cos_theta),
-            Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => {
-                HgDraine { g_hg: c * g_hg, g_d: c * g_d, alpha: c * alpha, w }.value(cos_theta)
+            Self::HgDraine(HgDraine {
+                g_hg,
+                g_d,
+                alpha,
+                w,
+            }) => HgDraine {
+                g_hg: c * g_hg,
+                g_d: c * g_d,
+                alpha: c * alpha,
+                w,
             }
+            .value(cos_theta),
         }
     }
 
@@ -139,7 +153,12 @@ impl Phase {
             Self::Isotropic => (0, [0.0; 4]),
             Self::HenyeyGreenstein { g } => (1, [g, 0.0, 0.0, 0.0]),
             Self::TwoLobe { g, g_back, mix } => (2, [g, g_back, mix, 0.0]),
-            Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => (3, [g_hg, g_d, alpha, w]),
+            Self::HgDraine(HgDraine {
+                g_hg,
+                g_d,
+                alpha,
+                w,
+            }) => (3, [g_hg, g_d, alpha, w]),
         };
         (kind, params.map(|p| p as f32))
     }

@@ -31,6 +31,17 @@ pub struct HeightRange {
     pub top: f64,
 }
 
+impl From<[f32; 3]> for HeightRange {
+    /// From (a, b, c), as in [`STRATUS_PROFILE`](crate::textures::STRATUS_PROFILE).
+    fn from([a, b, c]: [f32; 3]) -> Self {
+        Self {
+            full: a.into(),
+            thins: b.into(),
+            top: c.into(),
+        }
+    }
+}
+
 impl HeightRange {
     /// The range of a type between stratus (`cloud_type` 0) and cumulus (1), blended by a square root (Ford 4.2.1).
     /// A type outside 0..=1 counts as the nearer end.
@@ -73,22 +84,40 @@ pub fn erode(d: f64, n: f64, erosion: Erosion) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::textures::{CUMULUS_PROFILE, STRATUS_PROFILE, vertical_profile};
 
-    const CUMULUS: HeightRange = HeightRange { full: 0.1, thins: 0.4, top: 1.0 };
-    const STRATUS: HeightRange = HeightRange { full: 0.05, thins: 0.1, top: 0.2 };
+    const CUMULUS: HeightRange = HeightRange {
+        full: 0.1,
+        thins: 0.4,
+        top: 1.0,
+    };
+    const STRATUS: HeightRange = HeightRange {
+        full: 0.05,
+        thins: 0.1,
+        top: 0.2,
+    };
 
     #[test]
     fn remap_is_linear_between_the_ends() {
         assert_eq!(remap(3.0, [2.0, 4.0], [10.0, 20.0]), 15.0);
         assert_eq!(remap(2.0, [2.0, 4.0], [1.0, 0.0]), 1.0);
         assert_eq!(remap(5.0, [2.0, 4.0], [1.0, 0.0]), -0.5);
-        assert_eq!([remap(0.9, [1.0; 2], [0.0, 1.0]), remap(1.0, [1.0; 2], [0.0, 1.0])], [0.0, 1.0]);
+        assert_eq!(
+            [
+                remap(0.9, [1.0; 2], [0.0, 1.0]),
+                remap(1.0, [1.0; 2], [0.0, 1.0])
+            ],
+            [0.0, 1.0]
+        );
     }
 
     #[test]
     fn the_profile_rises_holds_and_falls() {
         let at = |h| CUMULUS.vertical_profile(h);
-        assert_eq!([at(-0.1), at(0.0), at(0.1), at(0.4), at(1.0), at(1.2)], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]);
+        assert_eq!(
+            [at(-0.1), at(0.0), at(0.1), at(0.4), at(1.0), at(1.2)],
+            [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
+        );
         assert!((at(0.05) - 0.5).abs() < 1e-12 && (at(0.7) - 0.5).abs() < 1e-12);
     }
 
@@ -103,13 +132,32 @@ mod tests {
     }
 
     #[test]
+    fn the_baked_gradient_follows_the_same_formula() {
+        for t in 0..=20_u8 {
+            for h in 0..=100_u8 {
+                let (t, h) = (f32::from(t) / 20.0, f32::from(h) / 100.0);
+                let range =
+                    HeightRange::of_type(STRATUS_PROFILE.into(), CUMULUS_PROFILE.into(), t.into());
+                let (baked, exact) = (vertical_profile(t, h), range.vertical_profile(h.into()));
+                assert!(
+                    (f64::from(baked) - exact).abs() < 1e-5,
+                    "type {t} height {h}: {baked}, not {exact}"
+                );
+            }
+        }
+    }
+
+    #[test]
     fn erosion_only_takes_away() {
         for erosion in [Erosion::Subtract, Erosion::Remap] {
             for i in 0..=50 {
                 for j in 0..=50 {
                     let (d, n) = (f64::from(i) / 50.0, f64::from(j) / 50.0);
                     let left = erode(d, n, erosion);
-                    assert!((0.0..=d + 1e-12).contains(&left), "{erosion:?} d {d} n {n}: {left}");
+                    assert!(
+                        (0.0..=d + 1e-12).contains(&left),
+                        "{erosion:?} d {d} n {n}: {left}"
+                    );
                 }
             }
             assert_eq!(erode(0.0, 1.0, erosion), 0.0);

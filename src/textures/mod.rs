@@ -33,8 +33,7 @@ use bevy::{
     core_pipeline::schedule::camera_driver,
     prelude::*,
     render::{
-        ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderStartup, RenderSystems, init_gpu_resource,
-        renderer::RenderGraph,
+        ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderSystems, renderer::RenderGraph,
     },
     shader::load_shader_library,
 };

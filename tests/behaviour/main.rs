@@ -2,6 +2,10 @@
 //! where there is none.
 
 mod gpu;
+mod headless;
+mod intervals;
 mod phases;
-//mod sampling_patterns;
+mod sampling_patterns;
+mod textures;
 mod twins;
+mod view;

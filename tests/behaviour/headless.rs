@@ -1,0 +1,220 @@
+//! The headless example, run as a user runs it.
+
+use std::{
+    collections::BTreeSet,
+    fs,
+    path::{Path, PathBuf},
+    process::{Command, Output},
+    sync::{
+        LazyLock,
+        atomic::{AtomicU32, Ordering},
+    },
+};
+
+use bevy_cumulus::settings::{CloudPreset, CloudSettings};
+use image::{DynamicImage, ImageReader, Rgba32FImage};
+use serde_json::Value;
+
+/// Textures small enough to be baked in no time.
+const SMALL: [&str; 4] = ["--set", "textures.volume_size=32", "--set", "textures.map_size=256"];
+
+fn binary() -> PathBuf {
+    let tests = std::env::current_exe().expect("a test knows its own path");
+    let folder = tests.parent().and_then(Path::parent).expect("tests lie in target/PROFILE/deps");
+    let path = folder.join("examples").join(format!("headless{}", std::env::consts::EXE_SUFFIX));
+    assert!(path.is_file(), "{} is missing: cargo build --example headless makes it", path.display());
+    path
+}
+
+/// A new, empty folder for a test's files.
+fn folder() -> PathBuf {
+    static COUNT: AtomicU32 = AtomicU32::new(0);
+    let name = format!("cumulus-headless-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+    let path = std::env::temp_dir().join(name);
+    fs::create_dir_all(&path).expect("the temporary folder can be written");
+    path
+}
+
+fn run_in(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(binary()).args(arguments).current_dir(folder).output().expect("the example starts")
+}
+
+/// Runs the example in a folder of its own and returns that.
+fn render(arguments: &[&str]) -> PathBuf {
+    let folder = folder();
+    let output = run_in(&folder, &[arguments, &SMALL].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?} failed with {:?}: {said}", output.status.code());
+    folder
+}
+
+fn read(path: &Path) -> DynamicImage {
+    let reader = ImageReader::open(path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
+    reader.decode().unwrap_or_else(|error| panic!("{}: {error}", path.display()))
+}
+
+fn read_cloud(path: &Path) -> Rgba32FImage {
+    match read(path) {
+        DynamicImage::ImageRgba32F(image) => image,
+        other => panic!("{}: RGBA in 32-bit float expected, found {:?}", path.display(), other.color()),
+    }
+}
+
+const SHOT: &[&str] = &["--size", "64x36", "--frames", "3", "--cloud", "cloud.exr", "--set", "model.density=0.9"];
+
+/// One run that writes everything, shared by the tests that look at it.
+static WRITTEN: LazyLock<PathBuf> = LazyLock::new(|| {
+    render(&[SHOT, &["--scene", "ground_noon", "--out", "shot.png", "--timings", "timings.json"]].concat())
+});
+
+#[test]
+fn list_prints_scenes_presets_and_paths_one_a_line() {
+    let output = run_in(&folder(), &["--list"]);
+    assert!(output.status.success());
+    let text = String::from_utf8(output.stdout).expect("the list is text");
+    let lines: BTreeSet<&str> = text.lines().collect();
+    let scenes = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills"].map(str::to_owned);
+    let paths = CloudSettings::default().paths();
+    assert!(paths.contains(&"model.coverage".to_owned()));
+    let wanted = scenes.into_iter().chain(CloudPreset::names().map(str::to_owned)).chain(paths);
+    assert_eq!(lines, wanted.collect::<Vec<_>>().iter().map(String::as_str).collect());
+}
+
+#[test]
+fn mistakes_are_named_and_nothing_is_written() {
+    let folder = folder();
+    let cases: &[(&[&str], &[&str])] = &[
+        (&["--scene", "moonbase"], &["moonbase", "ground_noon"]),
+        (&["--preset", "Nimbus"], &["Nimbus", "FairWeather"]),
+        (&["--preset", "missing.ron"], &["missing.ron"]),
+        (&["--set", "model.colour=1"], &["model.colour"]),
+        (&["--set", "model.coverage=1.5"], &["model.coverage", "1.5", "-1", "1"]),
+        (&["--set", "model.coverage=NaN"], &["model.coverage"]),
+        (&["--set", "model.top=100"], &["model.top", "model.bottom"]),
+        (&["--set", "model.coverage"], &["PATH=VALUE"]),
+        (&["--quality", "best"], &["--quality", "best", "ultra"]),
+        (&["--size", "0x36"], &["--size", "0x36", "8192"]),
+        (&["--size", "64x8193"], &["--size", "64x8193"]),
+        (&["--frames", "0"], &["--frames", "100000"]),
+        (&["--camera", "0,0,0"], &["--camera", "x,y,z,yaw,pitch"]),
+        (&["--camera", "0,nan,0,0,0"], &["--camera", "nan"]),
+        (&["--camera", "0,1,0,0,91"], &["--camera", "pitch", "90"]),
+        (&["--sun", "inf,0"], &["--sun", "inf"]),
+        (&["--move", "1,2,3"], &["--move", "dx,dy,dz,dyaw,dpitch"]),
+        (&["--time", "inf"], &["--time", "inf"]),
+        (&["--out", "nowhere/shot.png"], &["--out", "nowhere"]),
+        (&["--out", "shot.jpg"], &["shot.jpg", "png"]),
+        (&["--timings", "."], &["--timings", "directory"]),
+    ];
+    for (mistake, named) in cases {
+        // Another valid output, so that having none is never what is wrong.
+        let output = run_in(&folder, &[*mistake, &["--cloud", "never.exr"]].concat());
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success(), "{mistake:?} passed");
+        assert!(!said.contains("panicked"), "{mistake:?}: {said}");
+        for name in *named {
+            assert!(said.contains(name), "{mistake:?} does not name {name:?}: {said}");
+        }
+    }
+    let output = run_in(&folder, &["--scene", "sunset"]);
+    assert!(!output.status.success() && String::from_utf8_lossy(&output.stderr).contains("--out"));
+    assert_eq!(fs::read_dir(&folder).expect("the folder is there").count(), 0);
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_full_disk_is_an_error() {
+    // Opens, but takes no byte: what is written last must be checked too.
+    let folder = folder();
+    let output = run_in(&folder, &[&["--size", "8x8", "--frames", "1", "--timings", "/dev/full"], &SMALL[..]].concat());
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(!output.status.success() && said.contains("/dev/full") && !said.contains("panicked"), "{said}");
+}
+
+#[test]
+fn the_picture_has_the_size_asked_for_and_is_not_blank() {
+    let picture = read(&WRITTEN.join("shot.png")).to_rgb8();
+    assert_eq!(picture.dimensions(), (64, 36));
+    let colours: BTreeSet<_> = picture.pixels().map(|p| p.0).collect();
+    assert!(colours.len() > 100, "only {} colours", colours.len());
+}
+
+#[test]
+fn the_cloud_buffer_holds_cloud_and_clear_sky() {
+    let cloud = read_cloud(&WRITTEN.join("cloud.exr"));
+    assert_eq!(cloud.dimensions(), (64, 36));
+    assert!(cloud.pixels().all(|p| p.0.iter().all(|v| v.is_finite()) && (0.0..=1.0).contains(&p.0[3])));
+    let clear = cloud.pixels().filter(|p| p.0[3] > 0.99).count();
+    let cloudy: Vec<_> = cloud.pixels().filter(|p| p.0[3] < 0.5).collect();
+    assert!(clear > 20 && cloudy.len() > 20, "{clear} clear, {} cloudy", cloudy.len());
+    // Sunlit cloud is some thousands of cd/m²: exposure is divided out.
+    let brightest = cloudy.iter().map(|p| p.0[1]).fold(0.0, f32::max);
+    assert!((2.0e3..2.0e5).contains(&brightest), "{brightest} cd/m²");
+}
+
+#[test]
+fn the_timings_file_has_every_key() {
+    let text = fs::read_to_string(WRITTEN.join("timings.json")).expect("the file is there");
+    let timings: Value = serde_json::from_str(&text).expect("the file is JSON");
+    assert!(timings["adapter"].as_str().is_some_and(|name| !name.is_empty()));
+    assert_eq!(timings["size"], serde_json::json!([64, 36]));
+    let spread = |value: &Value| ["min", "median", "max"].map(|key| value[key].as_f64().expect("a number"));
+    let [min, median, max] = spread(&timings["frame"]);
+    assert!(0.0 < min && min <= median && median <= max);
+    for pass in ["cloud_sky", "cloud_march", "cloud_accumulate", "cloud_composite"] {
+        let times = timings["passes"].get(pass).unwrap_or_else(|| panic!("{pass} is missing"));
+        if !times.is_null() {
+            let [min, median, max] = spread(times);
+            assert!(0.0 <= min && min <= median && median <= max, "{pass}: {times}");
+        }
+    }
+    let settings = &timings["settings"];
+    for part in ["model", "lighting", "quality", "textures", "clock", "camera", "sun", "scene", "preset"] {
+        assert!(!settings[part].is_null(), "settings.{part} is missing");
+    }
+    assert_eq!(settings["model"]["density"], 0.9);
+    assert_eq!(settings["textures"]["volume_size"], 32);
+    assert_eq!(settings["scene"], "ground_noon");
+    assert_eq!(settings["preset"], "FairWeather");
+}
+
+#[test]
+fn the_same_command_gives_the_same_clouds_from_any_folder() {
+    let again = render(&[SHOT, &["--scene", "ground_noon", "--out", "shot.png"]].concat());
+    assert_ne!(again, *WRITTEN);
+    let (first, second) = (read_cloud(&WRITTEN.join("cloud.exr")), read_cloud(&again.join("cloud.exr")));
+    assert!(first == second, "two runs differ");
+}
+
+#[test]
+fn moves_are_made_before_every_frame_but_the_first() {
+    // Nothing is carried from frame to frame, so the last one is as if it stood alone.
+    let alone = ["--size", "32x18", "--set", "quality.temporal=off", "--set", "quality.offsets=false"];
+    let alone = [&alone[..], &["--cloud", "cloud.exr", "--no-sky"]].concat();
+    let moving = render(
+        &[
+            &alone[..],
+            &["--frames", "3", "--camera", "-50,100,0,-10,20", "--move", "0,100,0,5,0"],
+            &["--sun", "40,-20", "--sun-move", "1,-2", "--time", "100", "--dt", "10"],
+        ]
+        .concat(),
+    );
+    let standing = render(
+        &[&alone[..], &["--frames", "1", "--camera", "-50,300,0,0,20", "--sun", "42,-24", "--time", "120"]].concat(),
+    );
+    let started = render(
+        &[&alone[..], &["--frames", "1", "--camera", "-50,100,0,-10,20", "--sun", "40,-20", "--time", "100"]].concat(),
+    );
+    let [moving, standing, started] = [moving, standing, started].map(|path| read_cloud(&path.join("cloud.exr")));
+    assert!(moving == standing, "two moves from the start is where the third frame stands");
+    assert!(moving != started, "moves change what is seen");
+}
+
+#[test]
+fn without_sky_and_cloud_the_picture_is_black_above() {
+    let clear = ["--set", "model.coverage=-1", "--camera", "0,2,0,0,60"];
+    let files = ["--size", "16x16", "--frames", "1", "--no-sky", "--out", "shot.png", "--cloud", "cloud.exr"];
+    let folder = render(&[&files[..], &clear].concat());
+    assert!(read(&folder.join("shot.png")).to_rgb8().pixels().all(|p| p.0 == [0; 3]));
+    assert!(read_cloud(&folder.join("cloud.exr")).pixels().all(|p| p.0 == [0.0, 0.0, 0.0, 1.0]));
+}
