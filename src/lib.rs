@@ -49,7 +49,7 @@ use bevy::{
 };
 
 pub use model::ModelShader;
-pub use render::{CloudBuffer, CloudStatus};
+pub use render::{CloudBuffer, CloudFrame, CloudStatus};
 pub use settings::{
     CloudClock, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
     CloudTextures, CloudView,

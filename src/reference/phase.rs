@@ -147,6 +147,21 @@ impl Phase {
         }
     }
 
+    /// Mean cosine ⟨cosθ⟩ of the scattering angle.
+    pub fn mean_cosine(&self) -> f64 {
+        match *self {
+            Self::Isotropic => 0.0,
+            Self::HenyeyGreenstein { g } => g,
+            Self::TwoLobe { g, g_back, mix } => (1.0 - mix) * g + mix * g_back,
+            Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => {
+                // Draine 2003, equation 6.
+                let draine = g_d * (1.0 + alpha * (3.0 + 2.0 * g_d * g_d) / 5.0)
+                    / (1.0 + alpha * (1.0 + 2.0 * g_d * g_d) / 3.0);
+                (1.0 - w) * g_hg + w * draine
+            }
+        }
+    }
+
     /// `kind` and `params` of the shader's `phase()`.
     pub fn shader_parameters(&self) -> (u32, [f32; 4]) {
         let (kind, params) = match *self {

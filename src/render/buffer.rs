@@ -18,16 +18,38 @@ pub struct CloudBuffer(pub Handle<Image>);
 impl CloudBuffer {
     /// An image of this size (px) that the buffer can be written to: `Rgba32Float`.
     pub fn image(width: u32, height: u32) -> Image {
-        let size = Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 };
-        let mut image = Image::new_fill(
-            size,
-            TextureDimension::D2,
-            &[0; 16],
-            TextureFormat::Rgba32Float,
-            RenderAssetUsages::RENDER_WORLD,
-        );
-        image.texture_descriptor.usage =
-            TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
-        image
+        blank(width, height, TextureFormat::Rgba32Float, TextureUsages::STORAGE_BINDING)
     }
+}
+
+/// On a camera with [`CloudView`](crate::CloudView): every frame the newest marched frame, as the sliding window stores
+/// it, is copied into this image's top left.
+///
+/// RGB is radiance times the exposure when the history began, A transmittance, at the marched size (the view's divided
+/// by 1, 2 or 4, rounded up). For looking at single frames; make the image with [`CloudFrame::image`].
+#[derive(Component, Reflect, Clone, Debug)]
+#[reflect(Component, Clone)]
+pub struct CloudFrame(pub Handle<Image>);
+
+impl CloudFrame {
+    /// An image of this size (texels) that frames can be copied to: `Rgba16Float`.
+    pub fn image(width: u32, height: u32) -> Image {
+        blank(width, height, TextureFormat::Rgba16Float, TextureUsages::COPY_DST)
+    }
+}
+
+fn blank(width: u32, height: u32, format: TextureFormat, write: TextureUsages) -> Image {
+    let size = Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 };
+    let texel = [0; 16];
+    let bytes = if format == TextureFormat::Rgba32Float { 16 } else { 8 };
+    let mut image = Image::new_fill(
+        size,
+        TextureDimension::D2,
+        &texel[..bytes],
+        format,
+        RenderAssetUsages::RENDER_WORLD,
+    );
+    image.texture_descriptor.usage =
+        write | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
+    image
 }

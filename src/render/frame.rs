@@ -46,6 +46,7 @@ pub(crate) struct FrameUniform {
     sun_illuminance: Vec4,
     phase_params: Vec4,
     octave_factors: Vec4,
+    diffusion: Vec4,
     ambient: Vec4,
     ground_albedo: Vec4,
     sky_fallback: Vec4,
@@ -82,8 +83,8 @@ impl FrameUniform {
         let rook = rooks[slot as usize % rooks.len()];
         let stratum = 1.0 / window.window as f32;
         // Settings are validated before they get here, so the fallback is never seen.
-        let (kind, phase_params) =
-            Phase::from_settings(lighting).unwrap_or(Phase::Isotropic).shader_parameters();
+        let phase = Phase::from_settings(lighting).unwrap_or(Phase::Isotropic);
+        let (kind, phase_params) = phase.shader_parameters();
         Self {
             view_from_clip: input.clip_from_view.inverse(),
             local_from_view: Mat4::from_quat(local_from_world * input.world_from_view),
@@ -96,6 +97,7 @@ impl FrameUniform {
                 lighting.eccentricity,
                 lighting.phase_limit,
             ),
+            diffusion: diffusion(lighting, &phase),
             ambient: (lighting.ambient_tint * lighting.ambient_strength).extend(lighting.powder),
             ground_albedo: lighting.ground_albedo.extend(0.0),
             sky_fallback: lighting.sky_fallback.extend(0.0),
@@ -140,4 +142,11 @@ impl FrameUniform {
             ),
         }
     }
+}
+
+/// Strength and fall of the diffusion term; single scattering alone (one octave) has none.
+fn diffusion(lighting: &CloudLighting, phase: &Phase) -> Vec4 {
+    let strength = if lighting.octaves > 1 { lighting.diffusion } else { 0.0 };
+    let fall = 0.75 * (1.0 - phase.mean_cosine() as f32);
+    Vec4::new(strength, fall, 0.0, 0.0)
 }

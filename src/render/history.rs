@@ -173,9 +173,16 @@ impl CloudHistory {
     pub fn sum_after(&self) -> &TextureView {
         &self.sums[(self.frame.index & 1 ^ 1) as usize]
     }
-    /// The frames' texture, for tests that read them back.
+    /// All frames.
     pub fn frames(&self) -> &Texture {
         &self.frames
+    }
+    /// The newest frame, to be copied.
+    pub fn newest_copy(&self) -> TexelCopyTextureInfo<'_> {
+        TexelCopyTextureInfo {
+            origin: Origin3d { x: 0, y: 0, z: self.frame.layer() },
+            ..self.frames.as_image_copy()
+        }
     }
 }
 

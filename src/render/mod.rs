@@ -21,8 +21,8 @@ use bevy::{
 
 use crate::model::ModelBindings;
 
-pub use buffer::CloudBuffer;
-pub(crate) use status::{SharedStatus, StatusFlags};
+pub use buffer::{CloudBuffer, CloudFrame};
+pub(crate) use status::StatusFlags;
 pub use status::CloudStatus;
 
 /// Shaders, and the systems of the render world.
@@ -41,7 +41,7 @@ impl Plugin for CloudRenderPlugin {
         embedded_asset!(app, "accumulate/accumulate.wesl");
         embedded_asset!(app, "composite/composite.wesl");
         embedded_asset!(app, "composite/publish.wesl");
-        app.init_resource::<CloudStatus>().register_type::<CloudBuffer>();
+        app.init_resource::<CloudStatus>().register_type::<CloudBuffer>().register_type::<CloudFrame>();
     }
 }
 

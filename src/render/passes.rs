@@ -5,13 +5,15 @@ use bevy::{
     render::{
         camera::ExtractedCamera,
         diagnostic::RecordDiagnostics,
+        render_asset::RenderAssets,
         render_resource::*,
         renderer::{RenderContext, ViewQuery},
+        texture::GpuImage,
         view::ViewTarget,
     },
 };
 
-use super::{bind_groups::CloudBindGroups, history::CloudHistory};
+use super::{bind_groups::CloudBindGroups, history::CloudHistory, view::ExtractedCloudView};
 
 /// Texels along one side of a workgroup.
 const GROUP: u32 = 8;
@@ -73,13 +75,14 @@ pub(crate) fn cloud_march(
     );
 }
 
-/// Adds the newest frame, takes away the oldest; then publishes the result where it was asked for.
+/// Adds the newest frame, takes away the oldest; then hands out what was asked for.
 pub(crate) fn cloud_accumulate(
-    view: ViewQuery<(&CloudBindGroups, &CloudHistory)>,
+    view: ViewQuery<(&CloudBindGroups, &CloudHistory, &ExtractedCloudView)>,
+    images: Res<RenderAssets<GpuImage>>,
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
-    let (groups, history) = view.into_inner();
+    let (groups, history, cloud) = view.into_inner();
     let empty = (&groups.empty, &[][..]);
     let (id, own) = &groups.accumulate;
     dispatch(
@@ -97,6 +100,16 @@ pub(crate) fn cloud_accumulate(
             [empty, empty, (own, &[])],
             workgroups(history.viewport_size()),
         );
+    }
+    if let Some(image) = cloud.frame.and_then(|id| images.get(id)) {
+        let room = history.size().min(UVec2::new(image.texture.width(), image.texture.height()));
+        if image.texture.format() == history.frames().format() {
+            ctx.command_encoder().copy_texture_to_texture(
+                history.newest_copy(),
+                image.texture.as_image_copy(),
+                Extent3d { width: room.x, height: room.y, depth_or_array_layers: 1 },
+            );
+        }
     }
 }
 

@@ -15,7 +15,7 @@ use bevy::{
 };
 
 use super::{
-    CloudBuffer, StatusFlags,
+    CloudBuffer, CloudFrame, StatusFlags,
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey, Pose},
 };
@@ -42,6 +42,7 @@ pub(crate) struct ExtractedCloudView {
     quality: CloudQuality,
     reset: u32,
     pub buffer: Option<AssetId<Image>>,
+    pub frame: Option<AssetId<Image>>,
 }
 
 /// A view's uniforms.
@@ -51,6 +52,14 @@ pub(crate) struct CloudUniforms {
     pub model: UniformBuffer<ModelUniform>,
     pub world_from_local: UniformBuffer<Mat4>,
 }
+
+type CameraItems = (
+    RenderEntity,
+    &'static Camera,
+    Option<&'static CloudView>,
+    Option<&'static CloudBuffer>,
+    Option<&'static CloudFrame>,
+);
 
 /// What a view has of ours while it shows clouds.
 type Ours = (ExtractedCloudView, CloudUniforms, CloudHistory, super::bind_groups::CloudBindGroups);
@@ -69,12 +78,12 @@ pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut
 
 pub(crate) fn extract_views(
     mut commands: Commands,
-    cameras: Extract<Query<(RenderEntity, &Camera, Option<&CloudView>, Option<&CloudBuffer>)>>,
+    cameras: Extract<Query<CameraItems>>,
     good: Extract<Res<GoodSettings>>,
     had: Query<(), With<ExtractedCloudView>>,
     mut warned: Local<Option<String>>,
 ) {
-    for (entity, camera, view, buffer) in &cameras {
+    for (entity, camera, view, buffer, frame) in &cameras {
         let Some(view) = view.filter(|v| v.enabled && camera.is_active) else {
             if had.contains(entity) {
                 commands.entity(entity).remove::<Ours>();
@@ -97,6 +106,7 @@ pub(crate) fn extract_views(
             quality,
             reset: view.reset,
             buffer: buffer.map(|b| b.0.id()),
+            frame: frame.map(|f| f.0.id()),
         });
     }
 }

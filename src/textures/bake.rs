@@ -24,10 +24,10 @@ use super::{
 use crate::settings::{CloudTextures, GoodSettings};
 
 /// Most work that baking does in one frame on a software rasteriser, in texel-octaves: one texel of one octave of 3D Worley
-/// noise, or what takes as long. Measured at about 30 ms with Mesa's lavapipe on two cores.
+/// noise, or what takes as long. Measured at 20 to 25 ms with Mesa's lavapipe on two cores.
 ///
 /// On a GPU a frame may do [`GPU_FRAMES`] times as much. It must hold one slice of the largest volume, 256² × 6 octaves.
-pub const TEXEL_OCTAVES_PER_FRAME: u32 = 400_000;
+pub const TEXEL_OCTAVES_PER_FRAME: u32 = 800_000;
 
 /// How much more than [`TEXEL_OCTAVES_PER_FRAME`] one frame does on a GPU. A slow integrated one is some 50 times as fast as the
 /// software rasteriser, so this is a few milliseconds at most.

@@ -73,7 +73,9 @@ impl Plugin for CloudTexturesPlugin {
 /// from `Plugin::finish`; without it nothing is baked and [`CloudTextureStatus::baking`] stays false.
 pub(crate) fn build_render(render_app: &mut SubApp) {
     render_app.init_resource::<progress::Progress>().init_resource::<bake::Wanted>();
-    render_app.world().resource::<progress::Progress>().0.enabled.store(true, Relaxed);
+    let progress = render_app.world().resource::<progress::Progress>();
+    progress.0.enabled.store(true, Relaxed);
+    progress.0.ask();
     render_app
         .init_gpu_resource::<pipelines::BakePipelines>()
         .init_gpu_resource::<bake::Bakery>()
