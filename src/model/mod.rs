@@ -4,6 +4,7 @@
 //! that `medium.wesl` documents. The built-in one is the thesis's profile maps; [`ModelShader`] replaces it.
 
 mod bindings;
+mod probe;
 mod space;
 mod uniform;
 

@@ -1,6 +1,6 @@
 //! The tangent frame that densities are asked in.
 
-use bevy::math::{DQuat, DVec2, DVec3};
+use glam::{DQuat, DVec2, DVec3};
 
 /// A frame on the planet's surface straight below a point: y up, origin at altitude 0. Computed in f64, so that what
 /// is sent to the GPU is small and exact however far from the origin the point is.

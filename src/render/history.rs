@@ -133,13 +133,15 @@ impl CloudHistory {
         }
     }
 
-    /// Goes on to the next frame, or starts over where something changed.
-    pub fn advance(&mut self, device: &RenderDevice, key: HistoryKey, pose: Pose) {
+    /// Goes on to the next frame, or starts over where something changed or the last frame was not drawn.
+    pub fn advance(&mut self, device: &RenderDevice, key: HistoryKey, pose: Pose, drawn: bool) {
         if key.size != self.key.size || key.window != self.key.window {
             *self = Self::new(device, key, pose);
             return;
         }
-        let keep = key == self.key && stands_still(&self.pose, &pose, key.window, self.frame.exposure);
+        let keep = drawn
+            && key == self.key
+            && stands_still(&self.pose, &pose, key.window, self.frame.exposure);
         self.frame = if keep {
             FrameInWindow {
                 index: self.frame.index.wrapping_add(1),

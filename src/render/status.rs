@@ -44,8 +44,8 @@ impl StatusFlags {
         self.0.views_ready.store(ready, Ordering::Release);
     }
 
-    /// Frames count towards a window only once they are really drawn.
-    pub fn frames_may_count(&self) -> bool {
+    /// Whether the last frame was drawn: only then does it count towards a window.
+    pub fn views_were_drawn(&self) -> bool {
         self.0.views_ready.load(Ordering::Acquire)
     }
 }

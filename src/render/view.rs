@@ -189,16 +189,12 @@ pub(crate) fn prepare_views(
         let Some(space) = space else { continue };
         let (key, pose) = window_state(&item, &clouds, &textures, &space, sun);
         let mut first = None;
-        let window = match (&mut item.history, status.frames_may_count()) {
-            (Some(history), true) => {
-                history.advance(&device, key, pose);
+        let window = match &mut item.history {
+            Some(history) => {
+                history.advance(&device, key, pose, status.views_were_drawn());
                 history.frame
             }
-            (Some(history), false) => {
-                **history = CloudHistory::new(&device, key, pose);
-                history.frame
-            }
-            (None, _) => first.insert(CloudHistory::new(&device, key, pose)).frame,
+            None => first.insert(CloudHistory::new(&device, key, pose)).frame,
         };
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,

@@ -41,7 +41,7 @@ pub struct CloudLighting {
     pub eccentricity: f32,
     /// Strength of a diffusion term for the orders of scattering that the octaves lose, with two octaves or more:
     /// fluence inside a bright cloud, in units of the sun's illuminance (two-stream theory: about 2 at the lit
-    /// side). It falls as 1/(1 + ¾(1 − ⟨cosθ⟩)τ). 0 is the thesis alone. Default 1.2.
+    /// side). It falls as 1/(1 + ¾(1 − ⟨cosθ⟩)τ). 0 is the thesis alone. Default 1.1.
     #[reflect(@0.0..=10.0_f32)]
     pub diffusion: f32,
     /// The phase function. Default [`PhaseFunction::HgDraine`].
@@ -97,7 +97,7 @@ impl Default for CloudLighting {
             attenuation: 0.5,
             contribution: 0.5,
             eccentricity: 0.5,
-            diffusion: 1.2,
+            diffusion: 1.1,
             phase: PhaseFunction::HgDraine,
             g: 0.8,
             g_back: -0.3,

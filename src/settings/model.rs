@@ -28,10 +28,10 @@ pub struct CloudModel {
     /// Altitude of the upper shell (m); must be above `bottom`. Default 3300. A thicker shell costs more steps.
     #[reflect(@-300.0..=40_000.0_f32)]
     pub top: f32,
-    /// Added to the coverage map: −1 is a clear sky, 0 the map as it is, 1 overcast. Default 0.
+    /// Added to the coverage map: −1 is a clear sky, 0 the map as it is, 1 overcast. Default 0.04.
     #[reflect(@-1.0..=1.0_f32)]
     pub coverage: f32,
-    /// Global cloud type: 0 stratus (thin, low) to 1 cumulus (tall). Default 0.75.
+    /// Global cloud type: 0 stratus (thin, low) to 1 cumulus (tall). Default 0.95.
     #[reflect(@0.0..=1.0_f32)]
     pub cloud_type: f32,
     /// How much the type map lowers the global type from place to place (0..1). Default 0.6.
@@ -61,19 +61,19 @@ pub struct CloudModel {
     /// Strength of the erosion: 0 shows the bare profile, 1 the full noise. Default 1.
     #[reflect(@0.0..=1.0_f32)]
     pub noise_strength: f32,
-    /// Side of one repeat of the billowy (inverted Worley) noise (m). Default 4200.
+    /// Side of one repeat of the billowy (inverted Worley) noise (m). Default 5200.
     #[reflect(@50.0..=100_000.0_f32)]
     pub billow_scale: f32,
-    /// Side of one repeat of the fine billows read from the same volume (m). Default 1150.
+    /// Side of one repeat of the fine billows read from the same volume (m). Default 900.
     #[reflect(@20.0..=50_000.0_f32)]
     pub detail_scale: f32,
-    /// Share of the fine billows in the billowy noise (0..1; Ford's program: 0.4). Default 0.35.
+    /// Share of the fine billows in the billowy noise (0..1; Ford's program: 0.4). Default 0.25.
     #[reflect(@0.0..=1.0_f32)]
     pub detail_strength: f32,
     /// Side of one repeat of the wispy (Perlin fBm) noise (m). Default 1900.
     #[reflect(@20.0..=100_000.0_f32)]
     pub wisp_scale: f32,
-    /// Height in the layer (0 base, 1 top) by which wispy noise has given way to billowy noise. Default 0.3.
+    /// Height in the layer (0 base, 1 top) by which wispy noise has given way to billowy noise. Default 0.2.
     #[reflect(@0.01..=1.0_f32)]
     pub wisp_height: f32,
     /// Wind velocity (m/s, world axes; y moves the noise upward). Default (8, 0, 3).
@@ -96,8 +96,8 @@ impl Default for CloudModel {
         Self {
             bottom: 1300.0,
             top: 3300.0,
-            coverage: 0.0,
-            cloud_type: 0.75,
+            coverage: 0.04,
+            cloud_type: 0.95,
             type_variation: 0.6,
             map_scale: 26_000.0,
             type_scale: 14_000.0,
@@ -107,11 +107,11 @@ impl Default for CloudModel {
             albedo: Vec3::splat(0.9995),
             erosion: Erosion::Remap,
             noise_strength: 1.0,
-            billow_scale: 4200.0,
-            detail_scale: 1150.0,
-            detail_strength: 0.35,
+            billow_scale: 5200.0,
+            detail_scale: 900.0,
+            detail_strength: 0.25,
             wisp_scale: 1900.0,
-            wisp_height: 0.3,
+            wisp_height: 0.2,
             wind: Vec3::new(8.0, 0.0, 3.0),
             wind_skew: 350.0,
             evolution: 0.8,

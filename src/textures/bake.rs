@@ -1,4 +1,4 @@
-//! The render half: decides what each slot shows, bakes what is missing a little each frame, and swaps it in when complete.
+//! The render half: decides what each slot shows, bakes what is missing a little each frame, and swaps it in when done.
 
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -23,14 +23,14 @@ use super::{
 };
 use crate::settings::{CloudTextures, GoodSettings};
 
-/// Most work that baking does in one frame on a software rasteriser, in texel-octaves: one texel of one octave of 3D Worley
-/// noise, or what takes as long. Measured at 20 to 25 ms with Mesa's lavapipe on two cores.
+/// Most work that baking does in one frame on a software rasteriser, in texel-octaves: one texel of one octave of 3D
+/// Worley noise, or what takes as long. Measured at 10 to 30 ms with Mesa's lavapipe on two cores.
 ///
 /// On a GPU a frame may do [`GPU_FRAMES`] times as much. It must hold one slice of the largest volume, 256² × 6 octaves.
 pub const TEXEL_OCTAVES_PER_FRAME: u32 = 800_000;
 
-/// How much more than [`TEXEL_OCTAVES_PER_FRAME`] one frame does on a GPU. A slow integrated one is some 50 times as fast as the
-/// software rasteriser, so this is a few milliseconds at most.
+/// How much more than [`TEXEL_OCTAVES_PER_FRAME`] one frame does on a GPU. Estimated, not measured: any GPU should be tens
+/// of times as fast as the software rasteriser, which makes this a few milliseconds at most.
 pub const GPU_FRAMES: u32 = 8;
 
 /// What the main world asks for.
@@ -100,7 +100,7 @@ pub(crate) struct CloudTextureViews {
     pub type_map: Option<TextureView>,
     /// r the vertical profile; x the type, y the height.
     pub gradient: Option<TextureView>,
-    /// rgb three independent channels.
+    /// rgb three independent channels; a texel t in \[0, 1\] stands for `t * 255/256 + 0.5/256`.
     pub blue_noise: Option<TextureView>,
     pub generation: u64,
 }
@@ -186,9 +186,8 @@ impl Bakery {
 impl FromWorld for Bakery {
     fn from_world(world: &mut World) -> Self {
         // Bevy does not re-export the enum, only values of it.
-        let is_gpu = world
-            .get_resource::<RenderAdapterInfo>()
-            .is_some_and(|info| format!("{:?}", info.device_type) != "Cpu");
+        let is_gpu =
+            world.get_resource::<RenderAdapterInfo>().is_some_and(|info| format!("{:?}", info.device_type) != "Cpu");
         let budget = TEXEL_OCTAVES_PER_FRAME * if is_gpu { GPU_FRAMES } else { 1 };
         // Whoever holds views of a lost device has to notice: the count goes on.
         let generation = world.get_resource::<CloudTextureViews>().map_or(0, |views| views.generation + 1);
@@ -200,12 +199,10 @@ impl FromWorld for Bakery {
 }
 
 /// The user's image that a pyramid is built over, and its size, once it is on the GPU.
-fn source(
-    recipe: &Recipe,
-    slot: CloudTextureSlot,
-    images: &RenderAssets<GpuImage>,
-) -> Option<(TextureView, UVec2)> {
-    let Recipe::Pyramid { image, .. } = recipe else { return None };
+fn source(recipe: &Recipe, slot: CloudTextureSlot, images: &RenderAssets<GpuImage>) -> Option<(TextureView, UVec2)> {
+    let Recipe::Pyramid { image, .. } = recipe else {
+        return None;
+    };
     let image = usable(slot, *image, images)?;
     Some((image.texture_view.clone(), image.size_2d()))
 }
@@ -228,15 +225,16 @@ pub(super) fn plan(
     bakery.collect(&wanted, &mut views);
     let mut satisfied = true;
     for slot in CloudTextureSlot::BAKE_ORDER {
-        let Some(content) = wanted.content(slot) else { continue };
+        let Some(content) = wanted.content(slot) else {
+            continue;
+        };
         if bakery.shows(slot, &content) {
             continue;
         }
         match content {
             Content::Image { image, .. } => match usable(slot, image, &images) {
                 Some(gpu) => {
-                    let bound =
-                        Bound { content, texture: gpu.texture.clone(), view: gpu.texture_view.clone() };
+                    let bound = Bound { content, texture: gpu.texture.clone(), view: gpu.texture_view.clone() };
                     bakery.show(slot, bound, &mut views);
                 }
                 None => satisfied = false,
@@ -253,13 +251,7 @@ pub(super) fn plan(
     report(&mut bakery, satisfied, &wanted, &images, &progress);
 }
 
-fn report(
-    bakery: &mut Bakery,
-    satisfied: bool,
-    wanted: &Wanted,
-    images: &RenderAssets<GpuImage>,
-    progress: &Progress,
-) {
+fn report(bakery: &mut Bakery, satisfied: bool, wanted: &Wanted, images: &RenderAssets<GpuImage>, progress: &Progress) {
     let cells = &progress.0;
     cells.frame_budget.store(bakery.budget, Relaxed);
     if satisfied {
@@ -286,7 +278,9 @@ pub(super) fn bake(
     mut context: RenderContext,
 ) {
     let budget = u64::from(bakery.budget);
-    let Some(job) = bakery.job.as_mut() else { return };
+    let Some(job) = bakery.job.as_mut() else {
+        return;
+    };
     let tools = Tools { device: &device, queue: &queue, cache: &cache, pipelines: &pipelines };
     if job.is_complete() || !job.is_ready(&tools) {
         return;

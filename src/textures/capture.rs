@@ -13,10 +13,7 @@ use bevy::{
     },
 };
 
-use super::{
-    CloudTextureSlot, CloudTextureViews,
-    bake::Bakery,
-};
+use super::{CloudTextureSlot, CloudTextureViews, bake::Bakery};
 
 /// One level of a texture, in the order x, y, z.
 #[derive(Clone, PartialEq, Debug)]
@@ -79,11 +76,7 @@ pub fn read(app: &App, slot: CloudTextureSlot, level: u32) -> Result<Captured, S
         TexelCopyTextureInfo { texture, mip_level: level, origin: Origin3d::ZERO, aspect: TextureAspect::All },
         TexelCopyBufferInfo {
             buffer: &buffer,
-            layout: TexelCopyBufferLayout {
-                offset: 0,
-                bytes_per_row: Some(row_bytes),
-                rows_per_image: Some(size.y),
-            },
+            layout: TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(row_bytes), rows_per_image: Some(size.y) },
         },
         Extent3d { width: size.x, height: size.y, depth_or_array_layers: size.z },
     );

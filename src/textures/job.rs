@@ -12,7 +12,7 @@ use bevy::{
 };
 
 use super::{
-    pipelines::{BakePipelines, BakeParams, Kernel},
+    pipelines::{BakeParams, BakePipelines, Kernel},
     recipe::{Pass, Plan, Recipe},
     slots::CloudTextureSlot,
 };
@@ -95,7 +95,9 @@ impl Job {
 
     fn dispatch(&self, pass: &Pass, bands: u32, tools: &Tools, encoder: &mut CommandEncoder) {
         let (layout, id) = tools.pipelines.get(pass.kernel);
-        let Some(pipeline) = tools.cache.get_compute_pipeline(*id) else { return };
+        let Some(pipeline) = tools.cache.get_compute_pipeline(*id) else {
+            return;
+        };
         let (groups, first) = pass.dispatch(self.band, bands);
         let mut params = UniformBuffer::from(BakeParams { first, ..self.plan.params });
         params.write_buffer(tools.device, tools.queue);
@@ -115,10 +117,8 @@ impl Job {
         }) else {
             return;
         };
-        let mut compute = encoder.begin_compute_pass(&ComputePassDescriptor {
-            label: Some("cloud_bake"),
-            timestamp_writes: None,
-        });
+        let mut compute =
+            encoder.begin_compute_pass(&ComputePassDescriptor { label: Some("cloud_bake"), timestamp_writes: None });
         compute.set_pipeline(pipeline);
         compute.set_bind_group(0, &bind_group, &[]);
         compute.dispatch_workgroups(groups[0], groups[1], groups[2]);

@@ -32,9 +32,7 @@ use bevy::{
     asset::embedded_asset,
     core_pipeline::schedule::camera_driver,
     prelude::*,
-    render::{
-        ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderSystems, renderer::RenderGraph,
-    },
+    render::{ExtractSchedule, GpuResourceAppExt, Render, RenderApp, RenderSystems, renderer::RenderGraph},
     shader::load_shader_library,
 };
 
@@ -63,9 +61,9 @@ impl Plugin for CloudTexturesPlugin {
             .init_resource::<slots::SlotStates>()
             .register_type::<CloudTextureStatus>()
             .add_message::<CloudTextureError>()
-            .add_systems(PreStartup, slots::load_blue_noise)
+            .add_systems(PreStartup, slots::load_blue_noise.run_if(resource_exists::<Assets<Image>>))
             .add_systems(First, progress::report)
-            .add_systems(Last, slots::check_slots);
+            .add_systems(Last, slots::check_slots.run_if(resource_exists::<Assets<Image>>));
     }
 }
 

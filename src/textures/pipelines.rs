@@ -3,12 +3,10 @@
 use bevy::{
     asset::{AssetServer, load_embedded_asset},
     prelude::*,
-    render::{
-        render_resource::{
-            BindGroupLayoutDescriptor, BindGroupLayoutEntries, CachedComputePipelineId, ComputePipelineDescriptor,
-            PipelineCache, ShaderStages, ShaderType, StorageTextureAccess, TextureFormat, TextureSampleType,
-            binding_types::{texture_2d, texture_3d, texture_storage_2d, texture_storage_3d, uniform_buffer},
-        },
+    render::render_resource::{
+        BindGroupLayoutDescriptor, BindGroupLayoutEntries, CachedComputePipelineId, ComputePipelineDescriptor,
+        PipelineCache, ShaderStages, ShaderType, StorageTextureAccess, TextureFormat, TextureSampleType,
+        binding_types::{texture_2d, texture_3d, texture_storage_2d, texture_storage_3d, uniform_buffer},
     },
 };
 
@@ -70,7 +68,9 @@ impl Kernel {
         match self {
             Self::Billow | Self::Wisp => load_embedded_asset!(assets, "volumes.wesl"),
             Self::VolumeMip => load_embedded_asset!(assets, "volume_mip.wesl"),
-            Self::Coverage | Self::TypeMap | Self::Gradient => load_embedded_asset!(assets, "maps.wesl"),
+            Self::Coverage | Self::TypeMap | Self::Gradient => {
+                load_embedded_asset!(assets, "maps.wesl")
+            }
             Self::FirstLevel | Self::NextLevel => load_embedded_asset!(assets, "pyramid.wesl"),
         }
     }

@@ -19,12 +19,25 @@ pub(super) const MAX_MAP_SIZE: u32 = 8192;
 /// Everything a texture that we make depends on: equal recipes give equal textures.
 #[derive(Clone, PartialEq, Eq, Debug)]
 pub(super) enum Recipe {
-    Volume { kernel: Kernel, seed: u32, size: u32, cells: u32 },
-    Map { kernel: Kernel, seed: u32, size: u32, cells: u32 },
+    Volume {
+        kernel: Kernel,
+        seed: u32,
+        size: u32,
+        cells: u32,
+    },
+    Map {
+        kernel: Kernel,
+        seed: u32,
+        size: u32,
+        cells: u32,
+    },
     /// The vertical profile.
     Gradient,
     /// A pyramid over a user's image; the revision counts its changes.
-    Pyramid { image: AssetId<Image>, revision: u32 },
+    Pyramid {
+        image: AssetId<Image>,
+        revision: u32,
+    },
 }
 
 /// Octaves that each kernel can use.
@@ -40,7 +53,8 @@ fn octaves(kernel: Kernel, size: u32, cells: u32) -> u32 {
     (1..most_octaves(kernel)).take_while(|&i| (cells << i) * 2 <= size).count() as u32 + 1
 }
 
-/// Work that one texel takes, in units of one octave of 3D Worley noise. Measured on the software rasteriser, rounded up.
+/// Work that one texel takes, in units of one octave of 3D Worley noise (27 cells). Upper bounds: an octave in the plane
+/// looks at 9 cells, Perlin noise at 8 or 4 corners, a level of a pyramid at 36 texels.
 fn texel_cost(kernel: Kernel, octaves: u32) -> u64 {
     match kernel {
         Kernel::Billow | Kernel::Wisp => octaves.into(),
@@ -92,11 +106,7 @@ impl Recipe {
             }
             Self::Gradient => {
                 let shape = |p: [f32; 3]| Vec3::from_array(p).extend(0.0);
-                params = BakeParams {
-                    stratus: shape(STRATUS_PROFILE),
-                    cumulus: shape(CUMULUS_PROFILE),
-                    ..params
-                };
+                params = BakeParams { stratus: shape(STRATUS_PROFILE), cumulus: shape(CUMULUS_PROFILE), ..params };
                 passes.push(Pass::new(Kernel::Gradient, 0, size, 1));
             }
             Self::Pyramid { .. } => {}

@@ -298,7 +298,9 @@ impl SlotState {
         if changed.contains(&handle.id()) {
             self.checked = false;
         }
-        if !self.checked && let Some(image) = images.get(handle) {
+        if !self.checked
+            && let Some(image) = images.get(handle)
+        {
             self.checked = true;
             match check(slot, image) {
                 Ok(()) => {

@@ -2,23 +2,27 @@
 
 use std::{
     collections::BTreeSet,
+    io::Write,
     path::Path,
     sync::{
-        Once,
+        Mutex, Once, PoisonError,
         atomic::{AtomicU32, Ordering},
     },
 };
 
 use bevy::{
     app::{PluginGroupBuilder, Plugins},
-    log::{Level, LogPlugin},
+    log::{
+        Level, LogPlugin,
+        tracing_subscriber::{Registry, fmt},
+    },
     prelude::*,
     render::{
         RenderApp, RenderPlugin,
         error_handler::{RenderErrorHandler, RenderErrorPolicy},
         pipelined_rendering::PipelinedRenderingPlugin,
         render_resource::{
-            BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
+            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
             BufferDescriptor, BufferInitDescriptor, BufferUsages, CachedPipelineState,
             CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline,
             ComputePipelineDescriptor, MapMode, Pipeline, PipelineCache, PollType, ShaderStages,
@@ -63,11 +67,33 @@ pub fn headless_plugins() -> PluginGroupBuilder {
             level: Level::WARN,
             // Software rendering is slow: no news here.
             filter: "bevy_render::renderer=error".to_owned(),
+            custom_layer: |_| Some(Box::new(fmt::layer::<Registry>().with_ansi(false).with_writer(|| LogCopy))),
             ..default()
         })
     } else {
         plugins.disable::<LogPlugin>()
     }
+}
+
+/// Warnings and errors of all apps of this process.
+static LOG: Mutex<String> = Mutex::new(String::new());
+
+struct LogCopy;
+
+impl Write for LogCopy {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        LOG.lock().unwrap_or_else(PoisonError::into_inner).push_str(&String::from_utf8_lossy(bytes));
+        Ok(bytes.len())
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        Ok(())
+    }
+}
+
+/// How often a warning or error with this text came. Tests run side by side: take a text that no other test causes.
+pub fn times_logged(text: &str) -> usize {
+    LOG.lock().unwrap_or_else(PoisonError::into_inner).matches(text).count()
 }
 
 /// A running app with a renderer, these plugins, and no clouds of its own accord.
@@ -187,7 +213,19 @@ pub fn run_compute(
     output_len: usize,
     invocations: u32,
 ) -> Vec<f32> {
-    let layout = BindGroupLayoutDescriptor::new(
+    run_compute_with(app, wesl, None, input, output_len, invocations)
+}
+
+/// As [`run_compute`], with a bind group 1 of the caller's.
+pub fn run_compute_with(
+    app: &mut App,
+    wesl: &str,
+    group_1: Option<&(BindGroupLayoutDescriptor, BindGroup)>,
+    input: &[f32],
+    output_len: usize,
+    invocations: u32,
+) -> Vec<f32> {
+    let own = BindGroupLayoutDescriptor::new(
         "test compute",
         &BindGroupLayoutEntries::sequential(
             ShaderStages::COMPUTE,
@@ -197,14 +235,25 @@ pub fn run_compute(
             ),
         ),
     );
-    let pipeline = compile(app, wesl, &layout);
-    let result = dispatch(app, &pipeline, &layout, input, output_len, invocations);
+    let mut layouts = vec![own];
+    layouts.extend(group_1.map(|(layout, _)| layout.clone()));
+    let pipeline = compile(app, wesl, &layouts);
+    let other = group_1.map(|(_, group)| group);
+    let result = dispatch(
+        app,
+        &pipeline,
+        &layouts[0],
+        other,
+        input,
+        output_len,
+        invocations,
+    );
     // Errors of the commands above come out here.
     app.update();
     result
 }
 
-fn compile(app: &mut App, wesl: &str, layout: &BindGroupLayoutDescriptor) -> ComputePipeline {
+fn compile(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> ComputePipeline {
     static NEXT: AtomicU32 = AtomicU32::new(0);
     let path = format!(
         "embedded://behaviour/compute_{}.wesl",
@@ -214,7 +263,7 @@ fn compile(app: &mut App, wesl: &str, layout: &BindGroupLayoutDescriptor) -> Com
     let shader = app.world_mut().resource_mut::<Assets<Shader>>().add(shader);
     let descriptor = ComputePipelineDescriptor {
         label: Some("test compute".into()),
-        layout: vec![layout.clone()],
+        layout: layouts.to_vec(),
         shader: shader.clone(),
         entry_point: Some("main".into()),
         ..default()
@@ -252,6 +301,7 @@ fn dispatch(
     app: &App,
     pipeline: &ComputePipeline,
     layout: &BindGroupLayoutDescriptor,
+    group_1: Option<&BindGroup>,
     input: &[f32],
     output_len: usize,
     invocations: u32,
@@ -286,6 +336,9 @@ fn dispatch(
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &*group, &[]);
+        if let Some(other) = group_1 {
+            pass.set_bind_group(1, &**other, &[]);
+        }
         pass.dispatch_workgroups(invocations.div_ceil(64), 1, 1);
     }
     encoder.copy_buffer_to_buffer(&output, 0, &readable, 0, size);

@@ -3,6 +3,7 @@
 use std::{
     collections::BTreeSet,
     fs,
+    ops::Deref,
     path::{Path, PathBuf},
     process::{Command, Output},
     sync::{
@@ -26,13 +27,31 @@ fn binary() -> PathBuf {
     path
 }
 
-/// A new, empty folder for a test's files.
-fn folder() -> PathBuf {
-    static COUNT: AtomicU32 = AtomicU32::new(0);
-    let name = format!("cumulus-headless-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
-    let path = std::env::temp_dir().join(name);
-    fs::create_dir_all(&path).expect("the temporary folder can be written");
-    path
+/// A new, empty folder for a test's files; gone when the test is.
+struct Folder(PathBuf);
+
+impl Folder {
+    fn new() -> Self {
+        static COUNT: AtomicU32 = AtomicU32::new(0);
+        let name = format!("cumulus-headless-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
+        let path = std::env::temp_dir().join(name);
+        fs::create_dir_all(&path).expect("the temporary folder can be written");
+        Self(path)
+    }
+}
+
+impl Deref for Folder {
+    type Target = Path;
+    fn deref(&self) -> &Path {
+        &self.0
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        // What is left lies where the system clears up.
+        let _ = fs::remove_dir_all(&self.0);
+    }
 }
 
 fn run_in(folder: &Path, arguments: &[&str]) -> Output {
@@ -40,8 +59,8 @@ fn run_in(folder: &Path, arguments: &[&str]) -> Output {
 }
 
 /// Runs the example in a folder of its own and returns that.
-fn render(arguments: &[&str]) -> PathBuf {
-    let folder = folder();
+fn render(arguments: &[&str]) -> Folder {
+    let folder = Folder::new();
     let output = run_in(&folder, &[arguments, &SMALL].concat());
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{arguments:?} failed with {:?}: {said}", output.status.code());
@@ -63,13 +82,13 @@ fn read_cloud(path: &Path) -> Rgba32FImage {
 const SHOT: &[&str] = &["--size", "64x36", "--frames", "3", "--cloud", "cloud.exr", "--set", "model.density=0.9"];
 
 /// One run that writes everything, shared by the tests that look at it.
-static WRITTEN: LazyLock<PathBuf> = LazyLock::new(|| {
+static WRITTEN: LazyLock<Folder> = LazyLock::new(|| {
     render(&[SHOT, &["--scene", "ground_noon", "--out", "shot.png", "--timings", "timings.json"]].concat())
 });
 
 #[test]
 fn list_prints_scenes_presets_and_paths_one_a_line() {
-    let output = run_in(&folder(), &["--list"]);
+    let output = run_in(&Folder::new(), &["--list"]);
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).expect("the list is text");
     let lines: BTreeSet<&str> = text.lines().collect();
@@ -82,7 +101,7 @@ fn list_prints_scenes_presets_and_paths_one_a_line() {
 
 #[test]
 fn mistakes_are_named_and_nothing_is_written() {
-    let folder = folder();
+    let folder = Folder::new();
     let cases: &[(&[&str], &[&str])] = &[
         (&["--scene", "moonbase"], &["moonbase", "ground_noon"]),
         (&["--preset", "Nimbus"], &["Nimbus", "FairWeather"]),
@@ -118,14 +137,14 @@ fn mistakes_are_named_and_nothing_is_written() {
     }
     let output = run_in(&folder, &["--scene", "sunset"]);
     assert!(!output.status.success() && String::from_utf8_lossy(&output.stderr).contains("--out"));
-    assert_eq!(fs::read_dir(&folder).expect("the folder is there").count(), 0);
+    assert_eq!(fs::read_dir(&*folder).expect("the folder is there").count(), 0);
 }
 
 #[test]
 #[cfg(target_os = "linux")]
 fn a_full_disk_is_an_error() {
     // Opens, but takes no byte: what is written last must be checked too.
-    let folder = folder();
+    let folder = Folder::new();
     let output = run_in(&folder, &[&["--size", "8x8", "--frames", "1", "--timings", "/dev/full"], &SMALL[..]].concat());
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(!output.status.success() && said.contains("/dev/full") && !said.contains("panicked"), "{said}");
@@ -181,7 +200,7 @@ fn the_timings_file_has_every_key() {
 #[test]
 fn the_same_command_gives_the_same_clouds_from_any_folder() {
     let again = render(&[SHOT, &["--scene", "ground_noon", "--out", "shot.png"]].concat());
-    assert_ne!(again, *WRITTEN);
+    assert_ne!(again.0, WRITTEN.0);
     let (first, second) = (read_cloud(&WRITTEN.join("cloud.exr")), read_cloud(&again.join("cloud.exr")));
     assert!(first == second, "two runs differ");
 }

@@ -1,6 +1,7 @@
 //! Headless apps with clouds: a camera, a sun, and what the camera saw.
 
 use bevy::{
+    app::Plugins,
     camera::{Exposure, RenderTarget},
     light::{Atmosphere, atmosphere::ScatteringMedium, light_consts::lux},
     pbr::AtmosphereSettings,
@@ -48,13 +49,24 @@ pub struct View {
 /// # Panics
 /// As [`app_with`], and where clouds cannot be drawn on this device.
 pub fn clouds_app() -> App {
-    let mut app = app_with(CloudsPlugin);
+    clouds_app_with(CloudsPlugin)
+}
+
+/// [`clouds_app`] with these plugins, of which [`CloudsPlugin`] must be one.
+pub fn clouds_app_with<M>(plugins: impl Plugins<M>) -> App {
+    let mut app = app_with(plugins);
     let unsupported = app
         .world()
         .resource::<CloudStatus>()
         .unsupported()
         .map(str::to_owned);
     assert_eq!(unsupported, None, "clouds cannot be drawn on this device");
+    small_and_still(&mut app);
+    app
+}
+
+/// Textures as small as they may be, and a clock that stands still.
+pub fn small_and_still(app: &mut App) {
     app.insert_resource(CloudTextures {
         volume_size: 32,
         map_size: 64,
@@ -67,7 +79,6 @@ pub fn clouds_app() -> App {
     .insert_resource(TimeUpdateStrategy::ManualDuration(
         std::time::Duration::from_millis(16),
     ));
-    app
 }
 
 /// Spawns a sun that shines along `light`, straight from outside the atmosphere.

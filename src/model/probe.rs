@@ -1,0 +1,57 @@
+//! The model for shaders that are not the renderer's: tests and tools. Not part of the public interface.
+
+use bevy::{
+    math::DVec3,
+    prelude::*,
+    render::{
+        RenderApp,
+        render_resource::{BindGroup, BindGroupLayoutDescriptor, PipelineCache, TextureView, UniformBuffer},
+        renderer::{RenderDevice, RenderQueue},
+    },
+};
+
+use super::{ModelBindings, ModelShader, ModelUniform, TangentFrame, TexelSizes};
+use crate::{
+    reference::planet::PLANET_RADIUS,
+    settings::{CloudClock, CloudModel, Validate},
+    textures::CloudTextureViews,
+};
+
+impl ModelShader {
+    /// Bind group 1 with its layout, for a compute shader that imports `bevy_cumulus::model::model`: the app's model at
+    /// its cloud time, in the tangent frame below `camera` (world space, m), on Bevy's default planet. It keeps what the
+    /// settings are now.
+    ///
+    /// # Errors
+    /// Says what is missing or wrong.
+    #[doc(hidden)]
+    pub fn bindings(app: &App, camera: DVec3) -> Result<(BindGroupLayoutDescriptor, BindGroup), String> {
+        let model = app.world().get_resource::<CloudModel>().ok_or("no CloudModel")?;
+        model.validate().map_err(|error| error.to_string())?;
+        let clock = app.world().get_resource::<CloudClock>().ok_or("no CloudClock")?;
+        let world = app.get_sub_app(RenderApp).ok_or("no render app")?.world();
+        let views = world.get_resource::<CloudTextureViews>().ok_or("no textures on this device")?;
+        let sizes = texel_sizes(views).ok_or("the textures are not there yet")?;
+        let centre = DVec3::new(0.0, -PLANET_RADIUS, 0.0);
+        let frame = TangentFrame::below(camera + model.world_offset, centre, PLANET_RADIUS)
+            .ok_or("the camera is at the planet's centre, or not a number")?;
+        let device = world.resource::<RenderDevice>();
+        let mut uniform = UniformBuffer::from(ModelUniform::new(model, clock.seconds, &frame, sizes));
+        uniform.write_buffer(device, world.resource::<RenderQueue>());
+        let bindings = world.get_resource::<ModelBindings>().ok_or("clouds are off on this device")?;
+        let group = bindings
+            .bind_group(device, world.resource::<PipelineCache>(), &uniform, views)
+            .ok_or("the textures are not there yet")?;
+        Ok((bindings.layout.clone(), group))
+    }
+}
+
+fn texel_sizes(views: &CloudTextureViews) -> Option<TexelSizes> {
+    let width = |view: &Option<TextureView>| Some(view.as_ref()?.texture().width());
+    Some(TexelSizes {
+        billow: width(&views.billow)?,
+        wisp: width(&views.wisp)?,
+        coverage: width(&views.coverage)?,
+        type_map: width(&views.type_map)?,
+    })
+}

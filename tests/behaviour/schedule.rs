@@ -1,0 +1,107 @@
+//! Order: nothing of ours runs in an order that the schedule leaves open.
+
+use bevy::{
+    core_pipeline::schedule::Core3d,
+    ecs::schedule::{InternedScheduleLabel, NodeId, ScheduleLabel, Schedules},
+    prelude::*,
+    render::{ExtractSchedule, Render, RenderApp, renderer::RenderGraph},
+};
+
+use crate::view::{Sky, clouds_app, spawn_sun, spawn_view, until_drawn};
+
+const OURS: &str = "bevy_cumulus::";
+
+/// An app that draws, so that every schedule has been built.
+fn drawn() -> App {
+    let mut app = clouds_app();
+    spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
+    spawn_view(&mut app, UVec2::new(8, 8), Transform::default(), Sky::Atmosphere);
+    until_drawn(&mut app);
+    app
+}
+
+/// Conflicts of our systems whose order is open, in words, and how many systems of ours the schedule has.
+fn open_conflicts(world: &World, label: InternedScheduleLabel) -> (Vec<String>, usize) {
+    let schedule = world
+        .resource::<Schedules>()
+        .get(label)
+        .unwrap_or_else(|| panic!("there is no schedule {label:?}"));
+    let ours = schedule
+        .systems()
+        .unwrap_or_else(|_| panic!("{label:?} has not run"))
+        .filter(|(_, system)| system.name().to_string().contains(OURS))
+        .count();
+    let graph = schedule.graph();
+    let found = graph
+        .conflicting_systems()
+        .iter()
+        .filter_map(|(a, b, components)| {
+            let [a, b] = [a, b].map(|key| graph.get_node_name(&NodeId::System(*key)));
+            let names: Vec<String> = components
+                .iter()
+                .filter_map(|id| Some(world.components().get_name(*id)?.to_string()))
+                .collect();
+            (a.contains(OURS) || b.contains(OURS))
+                .then(|| format!("{label:?}: {a} and {b} conflict on {names:?}"))
+        })
+        .collect();
+    (found, ours)
+}
+
+#[test]
+fn no_system_of_ours_is_ambiguous() {
+    let app = drawn();
+    let main = [First.intern(), PreStartup.intern(), PreUpdate.intern(), Last.intern()];
+    let render = [
+        ExtractSchedule.intern(),
+        Render.intern(),
+        RenderGraph.intern(),
+        Core3d.intern(),
+    ];
+    let render_world = app.sub_app(RenderApp).world();
+    let worlds = main
+        .map(|label| (app.world(), label))
+        .into_iter()
+        .chain(render.map(|label| (render_world, label)));
+    let mut found = Vec::new();
+    for (world, label) in worlds {
+        let (conflicts, ours) = open_conflicts(world, label);
+        assert!(ours > 0, "{label:?} has no system of ours: names changed, or a list here is old");
+        found.extend(conflicts);
+    }
+    assert!(found.is_empty(), "order left open:\n{}", found.join("\n"));
+}
+
+#[test]
+fn passes_run_after_the_scene_and_before_tone_mapping() {
+    // Recording commands conflicts with nothing, so ambiguity detection does not see this order.
+    let app = drawn();
+    let schedules = app.sub_app(RenderApp).world().resource::<Schedules>();
+    let order: Vec<String> = schedules
+        .get(Core3d)
+        .expect("Core3d is there")
+        .systems()
+        .expect("Core3d has run")
+        .map(|(_, system)| system.name().to_string())
+        .collect();
+    let wanted = [
+        "::main_opaque_pass_3d",
+        "::main_transparent_pass_3d",
+        "::cloud_sky",
+        "::cloud_march",
+        "::cloud_accumulate",
+        "::cloud_composite",
+        "::tonemapping",
+        "::upscaling",
+    ];
+    let places = wanted.map(|name| {
+        order
+            .iter()
+            .position(|system| system.ends_with(name))
+            .unwrap_or_else(|| panic!("{name} is not in Core3d: {order:#?}"))
+    });
+    assert!(places.is_sorted(), "{wanted:?} run at {places:?}");
+    // The sky is drawn before what lies in front of it.
+    let sky = order.iter().position(|system| system.ends_with("::render_sky"));
+    assert!(sky.is_some_and(|sky| sky < places[2]), "render_sky runs at {sky:?}");
+}

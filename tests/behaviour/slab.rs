@@ -1,0 +1,355 @@
+//! A uniform slab through the unchanged renderer: a model of one's own, and answers in closed form to test against.
+//!
+//! What is drawn is stored as f16, which rounds by at most 2⁻¹¹ = 4.9e-4 of the value.
+
+use std::{f64::consts::PI, path::Path};
+
+use bevy::{camera::Exposure, light::light_consts::lux, math::DVec3, prelude::*};
+use bevy_cumulus::{
+    CloudsPlugin, ModelShader,
+    prelude::*,
+    reference::planet::{PLANET_RADIUS, altitude, shell_intervals},
+};
+
+use crate::{
+    gpu::{app_with, assert_shaders_compile, run_until, run_updates},
+    view::{Sky, View, cloud_pixels, small_and_still, spawn_sun, spawn_view, until_drawn},
+};
+
+const BOTTOM: f64 = 1500.0;
+const TOP: f64 = 2500.0;
+const ALBEDO: [f64; 3] = [0.9, 0.75, 0.5];
+/// Half of the last place of f16, doubled for what f32 adds on the way; and its smallest step.
+const STORED: f64 = 6e-4;
+const LEAST: f64 = 6e-8;
+const SIZE: UVec2 = UVec2::new(9, 7);
+
+/// Constant extinction (1/m) between two altitudes. The bound is exact.
+fn slab(extinction: f64) -> String {
+    format!(
+        "import bevy_cumulus::model::medium::{{Medium, empty_medium}};
+import bevy_cumulus::model::planet::altitude;
+
+fn model_bounds() -> vec2<f32> {{
+    return vec2<f32>({BOTTOM:?}, {TOP:?});
+}}
+
+fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{
+    let h = altitude(p, {PLANET_RADIUS:?});
+    let reach = exp2(lod);
+    return select(0.0, 1.0, h + reach >= {BOTTOM:?} && h - reach <= {TOP:?});
+}}
+
+fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
+    let h = altitude(p, {PLANET_RADIUS:?});
+    if h < {BOTTOM:?} || h > {TOP:?} {{
+        return empty_medium();
+    }}
+    return Medium(1.0, {extinction:?}, vec3<f32>({:?}, {:?}, {:?}), 1.0, (h - {BOTTOM:?}) / 1000.0);
+}}
+",
+        ALBEDO[0], ALBEDO[1], ALBEDO[2]
+    )
+}
+
+/// Single scattering by an isotropic medium, and nothing else.
+fn plain_light() -> CloudLighting {
+    CloudLighting {
+        octaves: 1,
+        diffusion: 0.0,
+        phase: bevy_cumulus::settings::PhaseFunction::Isotropic,
+        ambient_strength: 0.0,
+        powder: 0.0,
+        aerial_perspective: 0.0,
+        fade_start: 1.0,
+        ..default()
+    }
+}
+
+/// Every sample where the closed form has it, and none left out.
+fn exact_march(step: f32) -> CloudQuality {
+    CloudQuality {
+        resolution: MarchResolution::Full,
+        step,
+        step_growth: 0.0,
+        max_steps: 8192,
+        light_steps: 0,
+        light_growth: 1.0,
+        transmittance_stop: 0.0,
+        density_skip: 0.0,
+        max_distance: 2_000_000.0,
+        offsets: false,
+        temporal: TemporalMode::Off,
+        ..default()
+    }
+}
+
+fn slab_app(extinction: f64, sun: Vec3) -> (App, View) {
+    let model = ModelShader(slab(extinction));
+    let mut app = app_with(move |app: &mut App| {
+        app.insert_resource(model.clone()).add_plugins(CloudsPlugin);
+    });
+    small_and_still(&mut app);
+    app.insert_resource(plain_light());
+    spawn_sun(&mut app, -sun);
+    let view = spawn_view(&mut app, SIZE, Transform::default(), Sky::Black);
+    (app, view)
+}
+
+/// A viewpoint: the camera's altitude (m) and pitch (degrees up).
+fn looking(height: f32, pitch: f32) -> Transform {
+    Transform::from_xyz(0.0, height, 0.0).with_rotation(Quat::from_rotation_x(pitch.to_radians()))
+}
+
+/// The viewpoints of the tests: below, inside and above the slab.
+const VIEWPOINTS: [(f32, f32); 8] = [
+    (10.0, 70.0),
+    (10.0, 30.0),
+    (1900.0, 60.0),
+    (1900.0, 0.0),
+    (1900.0, -50.0),
+    (6000.0, -80.0),
+    (6000.0, -30.0),
+    (300_000.0, -70.0),
+];
+
+/// Directions through the middles of the pixels, row by row.
+fn directions(camera: &Transform) -> Vec<DVec3> {
+    let half = (f64::from(PerspectiveProjection::default().fov) / 2.0).tan();
+    let size = SIZE.as_dvec2();
+    (0..SIZE.y)
+        .flat_map(|y| (0..SIZE.x).map(move |x| (f64::from(x) + 0.5, f64::from(y) + 0.5)))
+        .map(|(x, y)| {
+            let across = (2.0 * x / size.x - 1.0) * half * size.x / size.y;
+            let up = (1.0 - 2.0 * y / size.y) * half;
+            camera.rotation.as_dquat() * DVec3::new(across, up, -1.0).normalize()
+        })
+        .collect()
+}
+
+fn spans(height: f64, mu: f64) -> Vec<[f64; 2]> {
+    shell_intervals(height, mu, BOTTOM, TOP, PLANET_RADIUS, 2e6)
+}
+
+/// Metres of slab along a ray, and how far f32 may be off: what a last place of the ray's slope changes, and of the length.
+fn length_in_slab(height: f64, mu: f64) -> (f64, f64) {
+    let length = |mu: f64| spans(height, mu).iter().map(|[a, b]| b - a).sum::<f64>();
+    let exact = length(mu);
+    let moved = |by: f64| (length((mu + by).clamp(-1.0, 1.0)) - exact).abs();
+    let far = spans(height, mu).last().map_or(0.0, |[_, b]| *b);
+    (exact, moved(4e-7).max(moved(-4e-7)) + 2e-6 * far)
+}
+
+/// Radiance of a wholly opaque, unshadowed slab: ϖ · p · E, with p = 1/4π.
+fn full_radiance(channel: usize) -> f64 {
+    ALBEDO[channel] * f64::from(lux::RAW_SUNLIGHT) / (4.0 * PI)
+}
+
+/// Turns the camera and returns each pixel with its ray's slope.
+fn seen_from(app: &mut App, view: &View, (height, pitch): (f32, f32)) -> Vec<(Vec4, DVec3)> {
+    let camera = looking(height, pitch);
+    app.world_mut().entity_mut(view.camera).insert(camera);
+    run_updates(app, 1);
+    cloud_pixels(app, view).into_iter().zip(directions(&camera)).collect()
+}
+
+#[test]
+fn transmittance_and_unshadowed_light_are_exact() {
+    let extinction = 4e-4;
+    let (mut app, view) = slab_app(extinction, Vec3::new(0.3, 1.0, 0.2));
+    app.insert_resource(exact_march(170.0));
+    until_drawn(&mut app);
+    let (mut worst, mut clear, mut thin, mut thick) = (0.0_f64, 0, 0, 0);
+    for viewpoint in VIEWPOINTS {
+        for (seen, ray) in seen_from(&mut app, &view, viewpoint) {
+            let (length, slack) = length_in_slab(viewpoint.0.into(), ray.y);
+            let exact = (-extinction * length).exp();
+            match length {
+                0.0 => clear += 1,
+                _ if exact > 0.3 => thin += 1,
+                _ => thick += 1,
+            }
+            // 1e-6 a step: f32 sums that many.
+            let allowed = exact * (STORED + extinction * slack + 1e-7 * length / 170.0) + LEAST;
+            let error = (f64::from(seen.w) - exact).abs();
+            worst = worst.max(error / allowed);
+            assert!(error <= allowed, "{viewpoint:?} {ray}: T = {}, not {exact} ± {allowed:e}", seen.w);
+            for (channel, value) in seen.xyz().to_array().into_iter().enumerate() {
+                let full = full_radiance(channel);
+                let exact_light = full * (1.0 - exact);
+                let allowed = STORED * exact_light + full * (exact * extinction * slack + 2e-6);
+                let error = (f64::from(value) - exact_light).abs();
+                assert!(error <= allowed, "{viewpoint:?} {ray}: {value} cd/m², not {exact_light} ± {allowed}");
+            }
+        }
+    }
+    println!("slab: worst error {worst} of the allowed; {clear} clear, {thin} thin, {thick} thick rays");
+    assert!(clear > 10 && thin > 50 && thick > 50, "{clear} clear, {thin} thin, {thick} thick");
+}
+
+/// Single scattering along a ray: ϖ·p·E ∫ σt e^(−σt s) e^(−σt d(s)) ds, with d the slab between the point and the sun;
+/// s counts metres of slab. Midpoint rule, 400 pieces a span (error below 1e-5 here).
+fn single_scattering(height: f64, ray: DVec3, sun: DVec3, extinction: f64) -> f64 {
+    const PIECES: u32 = 400;
+    let (mut passed, mut sum) = (0.0, 0.0);
+    for [a, b] in spans(height, ray.y) {
+        let piece = (b - a) / f64::from(PIECES);
+        for i in 0..PIECES {
+            let p = DVec3::Y * height + ray * (a + piece * (f64::from(i) + 0.5));
+            let up = (p + DVec3::Y * PLANET_RADIUS).normalize();
+            let to_sun: f64 =
+                spans(altitude(p, PLANET_RADIUS), up.dot(sun)).iter().map(|[a, b]| b - a).sum();
+            let inside = -(-extinction * piece).exp_m1();
+            sum += (-extinction * (passed + to_sun)).exp() * inside;
+            passed += piece;
+        }
+    }
+    sum
+}
+
+#[test]
+fn shadowed_light_is_the_integral_along_the_curved_shell() {
+    let sun = Vec3::new(0.5, 1.0, -0.3).normalize();
+    // Optical depth towards the sun, straight through the slab: 0.35 and 2.3.
+    for extinction in [3e-4, 2e-3] {
+        let (mut app, view) = slab_app(extinction, sun);
+        // The longest way to the sun is 1000 m over the sun's height, some more for points that see it lower.
+        let light_step = (1000.0 / f64::from(sun.y) * 1.06 / 64.0) as f32;
+        let step = 40.0_f32;
+        app.insert_resource(CloudQuality { light_steps: 64, light_step, ..exact_march(step) });
+        until_drawn(&mut app);
+        // A light step counts whole or not at all: the depth is off by at most half a step. And the shadow changes within
+        // a step of the view by its second derivative: (σt · step)² / 24, for a ray that runs along the sun's.
+        let depth = extinction * f64::from(light_step) / 2.0;
+        let tolerance = STORED + depth.exp_m1() + (2.0 * extinction * f64::from(step)).powi(2) / 24.0;
+        let (mut worst, mut mean, mut count) = (0.0_f64, 0.0, 0);
+        for viewpoint in [(10.0, 60.0), (10.0, 25.0), (1900.0, 50.0), (1900.0, -40.0), (6000.0, -75.0), (6000.0, -35.0)] {
+            for (seen, ray) in seen_from(&mut app, &view, viewpoint) {
+                let share = single_scattering(viewpoint.0.into(), ray, sun.as_dvec3(), extinction);
+                let length = length_in_slab(viewpoint.0.into(), ray.y).0;
+                if length == 0.0 {
+                    assert_eq!(seen, Vec4::W, "{viewpoint:?} {ray}");
+                    continue;
+                }
+                for (channel, value) in seen.xyz().to_array().into_iter().enumerate() {
+                    let exact = full_radiance(channel) * share;
+                    let error = f64::from(value) / exact - 1.0;
+                    worst = worst.max(error.abs());
+                    mean += error;
+                    count += 1;
+                    assert!(
+                        error.abs() <= tolerance,
+                        "σt {extinction}, {viewpoint:?} {ray}: {value} cd/m², not {exact} ± {:.2} %",
+                        100.0 * tolerance
+                    );
+                }
+            }
+        }
+        mean /= f64::from(count);
+        println!("slab, σt {extinction}: worst {worst:.2e}, mean {mean:.2e}, allowed {tolerance:.2e}, {count} values");
+        assert!(count > 600, "only {count} values");
+        // Half steps too many and too few cancel: no offset is left.
+        assert!(mean.abs() < 0.25 * tolerance, "{mean:e} on average");
+    }
+}
+
+#[test]
+fn long_steps_keep_energy_only_where_they_are_integrated() {
+    let extinction = 0.01;
+    let step = 300.0;
+    let (mut app, view) = slab_app(extinction, Vec3::Y);
+    app.insert_resource(exact_march(step));
+    until_drawn(&mut app);
+    let viewpoint = (10.0, 75.0);
+    let rays = seen_from(&mut app, &view, viewpoint);
+    app.insert_resource(CloudQuality { integration: Integration::Naive, ..exact_march(step) });
+    run_updates(&mut app, 1);
+    for ((conserving, ray), naive) in rays.into_iter().zip(cloud_pixels(&app, &view)) {
+        let (length, _) = length_in_slab(viewpoint.0.into(), ray.y);
+        // Σ Tᵢ σt Δᵢ, with the last step cut at the slab's end.
+        let (mut too_bright, mut start) = (0.0, 0.0);
+        while start < length {
+            let dt = f64::from(step).min(length - start);
+            too_bright += (-extinction * start).exp() * extinction * dt;
+            start += dt;
+        }
+        let exact = 1.0 - (-extinction * length).exp();
+        for channel in 0..3 {
+            let share = |pixel: Vec4| f64::from(pixel[channel]) / full_radiance(channel);
+            let (found, naive) = (share(conserving), share(naive));
+            assert!((found / exact - 1.0).abs() < 2e-3, "{ray}: {found}, not {exact}");
+            assert!((naive / too_bright - 1.0).abs() < 2e-3, "{ray}: {naive}, not {too_bright}");
+            // σt Δ / (1 − e^(−σt Δ)) = 3.16 times as much light as there is.
+            assert!(naive > 3.0 * exact, "{ray}: {naive} is not too bright");
+        }
+    }
+}
+
+#[test]
+fn a_model_may_come_after_the_plugin_and_change() {
+    let mut app = app_with(CloudsPlugin);
+    small_and_still(&mut app);
+    app.insert_resource(plain_light()).insert_resource(exact_march(170.0));
+    spawn_sun(&mut app, Vec3::NEG_Y);
+    let view = spawn_view(&mut app, SIZE, looking(10.0, 60.0), Sky::Black);
+    let matches = |app: &App, extinction: f64| {
+        let rays = directions(&looking(10.0, 60.0));
+        cloud_pixels(app, &view).iter().zip(rays).all(|(seen, ray)| {
+            let exact = (-extinction * length_in_slab(10.0, ray.y).0).exp();
+            (f64::from(seen.w) / exact - 1.0).abs() < 2e-3
+        })
+    };
+    for extinction in [4e-4, 9e-4] {
+        // At once the first time, before the built-in model has loaded.
+        app.insert_resource(ModelShader(slab(extinction)));
+        run_until(&mut app, &format!("the slab of {extinction}/m is drawn"), 60, |app| {
+            assert_shaders_compile(app);
+            app.world().resource::<CloudStatus>().is_ready() && matches(app, extinction)
+        });
+        // And it stays.
+        run_updates(&mut app, 4);
+        assert!(matches(&app, extinction), "the slab of {extinction}/m is gone again");
+    }
+    assert_eq!(Exposure { ev100: 13.0 }.exposure(), app.world().get::<Exposure>(view.camera).unwrap().exposure());
+}
+
+/// Every `.rs` and `.wesl` file below a folder, with its text.
+fn sources(folder: &Path) -> Vec<(String, String)> {
+    let mut found = Vec::new();
+    for entry in std::fs::read_dir(folder).expect("the folder is there") {
+        let path = entry.expect("it can be read").path();
+        if path.is_dir() {
+            found.extend(sources(&path));
+        } else if path.extension().is_some_and(|e| e == "rs" || e == "wesl") {
+            let text = std::fs::read_to_string(&path).expect("a source is text");
+            found.push((path.display().to_string(), text));
+        }
+    }
+    found
+}
+
+#[test]
+fn the_model_knows_nothing_of_the_renderer() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let model = sources(&root.join("model"));
+    assert!(model.len() >= 6, "only {} files of the model", model.len());
+    for (path, text) in &model {
+        for forbidden in ["crate::render", "super::render", "package::render", "bevy_cumulus::render", "bevy_pbr"] {
+            assert!(!text.contains(forbidden), "{path} mentions {forbidden}");
+        }
+    }
+    // And the renderer's shaders know of the model what medium.wesl says, and the planet it stands on.
+    for (path, text) in sources(&root.join("render")).iter().filter(|(path, _)| path.ends_with(".wesl")) {
+        assert!(!text.contains("@group(1)"), "{path} binds the model's group");
+        let imports = text.split("import ").skip(1).filter_map(|rest| rest.split(';').next());
+        for import in imports.filter(|import| import.contains("model")) {
+            for name in import.split([':', '{', '}', ',', ' ', '\n']).filter(|name| !name.is_empty()) {
+                let known = [
+                    "package", "bevy_cumulus", "model", "medium", "Medium", "planet", "model_bounds",
+                    "density_bound", "sample_medium", "empty_medium", "shell_intervals",
+                ];
+                assert!(known.contains(&name), "{path} imports {name} of the model");
+            }
+        }
+    }
+}
