@@ -33,6 +33,8 @@
 #![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
+#[cfg(feature = "inspector")]
+pub mod inspector;
 mod model;
 pub mod reference;
 mod render;
@@ -130,3 +132,8 @@ fn missing_capability(world: &World) -> Option<String> {
     }
     None
 }
+
+/// Compiles the README's quick start.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;

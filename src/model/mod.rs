@@ -52,5 +52,10 @@ fn register_model_shader(
     mut held: ResMut<ModelShaderHandle>,
     mut shaders: ResMut<Assets<Shader>>,
 ) {
-    held.0 = Some(shaders.add(Shader::from_wesl(source.0.clone(), MODEL_PATH)));
+    let shader = Shader::from_wesl(source.0.clone(), MODEL_PATH);
+    // The same asset again: the pipelines that use it are then built anew.
+    let replaced = held.0.as_ref().is_some_and(|handle| shaders.insert(handle.id(), shader.clone()).is_ok());
+    if !replaced {
+        held.0 = Some(shaders.add(shader));
+    }
 }

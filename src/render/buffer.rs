@@ -2,9 +2,16 @@
 
 use bevy::{
     asset::RenderAssetUsages,
+    platform::collections::HashSet,
     prelude::*,
-    render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureUsages},
+    render::{
+        render_asset::RenderAssets,
+        render_resource::{Extent3d, Texture, TextureDimension, TextureFormat, TextureUsages},
+        texture::GpuImage,
+    },
 };
+
+use super::view::ExtractedCloudView;
 
 /// On a camera with [`CloudView`](crate::CloudView): every frame the resolved clouds are written into this image.
 ///
@@ -52,4 +59,46 @@ fn blank(width: u32, height: u32, format: TextureFormat, write: TextureUsages) -
     image.texture_descriptor.usage =
         write | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
     image
+}
+
+/// What keeps `texture` from being a plain 2D one of this format and use.
+fn unfit(texture: &Texture, format: TextureFormat, usage: TextureUsages) -> Option<String> {
+    if texture.format() != format {
+        Some(format!("its format is {:?}, and {format:?} is needed", texture.format()))
+    } else if !texture.usage().contains(usage) {
+        Some(format!("its usage lacks {usage:?}"))
+    } else if texture.dimension() != TextureDimension::D2
+        || texture.depth_or_array_layers() != 1
+        || texture.mip_level_count() != 1
+        || texture.sample_count() != 1
+    {
+        Some("it is not a plain 2D image of one layer, mip level and sample".to_owned())
+    } else {
+        None
+    }
+}
+
+/// Refuses images that the passes could not write to, each with one error.
+pub(crate) fn refuse_unfit_images(
+    mut views: Query<&mut ExtractedCloudView>,
+    images: Res<RenderAssets<GpuImage>>,
+    mut refused: Local<HashSet<(&'static str, AssetId<Image>)>>,
+) {
+    let mut check = |slot: &mut Option<AssetId<Image>>, name: &'static str, format, usage| {
+        let Some(id) = *slot else { return };
+        let Some(image) = images.get(id) else { return };
+        let Some(why) = unfit(&image.texture, format, usage) else {
+            refused.remove(&(name, id));
+            return;
+        };
+        if refused.insert((name, id)) {
+            error!("clouds: the image of {name} cannot be used: {why}; make it with {name}::image");
+        }
+        *slot = None;
+    };
+    for mut view in &mut views {
+        let view = &mut *view;
+        check(&mut view.buffer, "CloudBuffer", TextureFormat::Rgba32Float, TextureUsages::STORAGE_BINDING);
+        check(&mut view.frame, "CloudFrame", TextureFormat::Rgba16Float, TextureUsages::COPY_DST);
+    }
 }

@@ -175,10 +175,6 @@ impl CloudHistory {
     pub fn sum_after(&self) -> &TextureView {
         &self.sums[(self.frame.index & 1 ^ 1) as usize]
     }
-    /// All frames.
-    pub fn frames(&self) -> &Texture {
-        &self.frames
-    }
     /// The newest frame, to be copied.
     pub fn newest_copy(&self) -> TexelCopyTextureInfo<'_> {
         TexelCopyTextureInfo {

@@ -58,7 +58,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
                 view::request_depth
                     .in_set(RenderSystems::Prepare)
                     .before(prepare_core_3d_depth_textures),
-                view::prepare_views.in_set(RenderSystems::PrepareResources),
+                (view::prepare_views, buffer::refuse_unfit_images).in_set(RenderSystems::PrepareResources),
                 bind_groups::prepare_bind_groups.in_set(RenderSystems::PrepareBindGroups),
             ),
         )

@@ -103,13 +103,11 @@ pub(crate) fn cloud_accumulate(
     }
     if let Some(image) = cloud.frame.and_then(|id| images.get(id)) {
         let room = history.size().min(UVec2::new(image.texture.width(), image.texture.height()));
-        if image.texture.format() == history.frames().format() {
-            ctx.command_encoder().copy_texture_to_texture(
-                history.newest_copy(),
-                image.texture.as_image_copy(),
-                Extent3d { width: room.x, height: room.y, depth_or_array_layers: 1 },
-            );
-        }
+        ctx.command_encoder().copy_texture_to_texture(
+            history.newest_copy(),
+            image.texture.as_image_copy(),
+            Extent3d { width: room.x, height: room.y, depth_or_array_layers: 1 },
+        );
     }
 }
 

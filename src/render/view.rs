@@ -16,6 +16,7 @@ use bevy::{
 
 use super::{
     CloudBuffer, CloudFrame, StatusFlags,
+    bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey, Pose},
 };
@@ -62,17 +63,13 @@ type CameraItems = (
 );
 
 /// What a view has of ours while it shows clouds.
-type Ours = (ExtractedCloudView, CloudUniforms, CloudHistory, super::bind_groups::CloudBindGroups);
+type Ours = (ExtractedCloudView, CloudUniforms, CloudHistory, CloudBindGroups, SkyLightBuffer);
 
 pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut<ExtractedClouds>) {
-    let fresh = &good.0;
-    let clock = out.settings.clock.clone();
-    out.settings.clock = fresh.clock.clone();
-    if out.settings != *fresh {
-        out.settings = fresh.clone();
+    out.settings.clock.clone_from(&good.0.clock);
+    if out.settings != good.0 {
+        out.settings.clone_from(&good.0);
         out.version += 1;
-    } else if clock.speed != fresh.clock.speed {
-        out.settings.clock = fresh.clock.clone();
     }
 }
 
@@ -174,7 +171,7 @@ pub(crate) fn prepare_views(
     for mut item in &mut views {
         let viewport = item.view.viewport;
         if viewport.z == 0 || viewport.w == 0 {
-            commands.entity(item.entity).remove::<(CloudHistory, CloudUniforms)>();
+            commands.entity(item.entity).remove::<(CloudHistory, CloudUniforms, CloudBindGroups)>();
             continue;
         }
         let space = space_below(item.view, item.atmosphere, &clouds.settings);
@@ -182,7 +179,7 @@ pub(crate) fn prepare_views(
             if warned.insert(item.entity) {
                 warn!("clouds: camera {} shows no clouds: {reason}", item.entity);
             }
-            commands.entity(item.entity).remove::<(CloudHistory, CloudUniforms)>();
+            commands.entity(item.entity).remove::<(CloudHistory, CloudUniforms, CloudBindGroups)>();
             continue;
         }
         warned.remove(&item.entity);

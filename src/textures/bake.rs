@@ -187,7 +187,7 @@ impl FromWorld for Bakery {
     fn from_world(world: &mut World) -> Self {
         // Bevy does not re-export the enum, only values of it.
         let is_gpu =
-            world.get_resource::<RenderAdapterInfo>().is_some_and(|info| format!("{:?}", info.device_type) != "Cpu");
+            world.get_resource::<RenderAdapterInfo>().is_some_and(|info| info.device_type != wgpu::DeviceType::Cpu);
         let budget = TEXEL_OCTAVES_PER_FRAME * if is_gpu { GPU_FRAMES } else { 1 };
         // Whoever holds views of a lost device has to notice: the count goes on.
         let generation = world.get_resource::<CloudTextureViews>().map_or(0, |views| views.generation + 1);

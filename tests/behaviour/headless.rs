@@ -19,7 +19,7 @@ use serde_json::Value;
 /// Textures small enough to be baked in no time.
 const SMALL: [&str; 4] = ["--set", "textures.volume_size=32", "--set", "textures.map_size=256"];
 
-fn binary() -> PathBuf {
+pub fn binary() -> PathBuf {
     let tests = std::env::current_exe().expect("a test knows its own path");
     let folder = tests.parent().and_then(Path::parent).expect("tests lie in target/PROFILE/deps");
     let path = folder.join("examples").join(format!("headless{}", std::env::consts::EXE_SUFFIX));

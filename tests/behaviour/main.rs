@@ -1,15 +1,23 @@
 //! What the crate does, by behaviour. GPU tests run on whatever Vulkan device there is, a software one too, and fail
 //! where there is none.
 
+mod bad_input;
 mod bound;
+mod cameras;
+mod goldens;
+mod drift;
 mod gpu;
+mod halves;
 mod headless;
 mod intervals;
+mod occlusion;
 mod phases;
 mod sampling_patterns;
 mod schedule;
+mod settings;
 mod shaders;
 mod slab;
+mod stage;
 mod textures;
 mod twins;
 mod view;

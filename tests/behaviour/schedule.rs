@@ -1,8 +1,10 @@
 //! Order: nothing of ours runs in an order that the schedule leaves open.
 
+use std::collections::HashMap;
+
 use bevy::{
     core_pipeline::schedule::Core3d,
-    ecs::schedule::{InternedScheduleLabel, NodeId, ScheduleLabel, Schedules},
+    ecs::schedule::{InternedScheduleLabel, ScheduleLabel, Schedules, SystemKey},
     prelude::*,
     render::{ExtractSchedule, Render, RenderApp, renderer::RenderGraph},
 };
@@ -26,23 +28,24 @@ fn open_conflicts(world: &World, label: InternedScheduleLabel) -> (Vec<String>, 
         .resource::<Schedules>()
         .get(label)
         .unwrap_or_else(|| panic!("there is no schedule {label:?}"));
-    let ours = schedule
+    let names: HashMap<SystemKey, String> = schedule
         .systems()
         .unwrap_or_else(|_| panic!("{label:?} has not run"))
-        .filter(|(_, system)| system.name().to_string().contains(OURS))
-        .count();
-    let graph = schedule.graph();
-    let found = graph
+        .map(|(key, system)| (key, system.name().to_string()))
+        .collect();
+    let ours = names.values().filter(|name| name.contains(OURS)).count();
+    let found = schedule
+        .graph()
         .conflicting_systems()
         .iter()
         .filter_map(|(a, b, components)| {
-            let [a, b] = [a, b].map(|key| graph.get_node_name(&NodeId::System(*key)));
-            let names: Vec<String> = components
+            let [a, b] = [a, b].map(|key| names.get(key).map_or("?", String::as_str));
+            let on: Vec<String> = components
                 .iter()
                 .filter_map(|id| Some(world.components().get_name(*id)?.to_string()))
                 .collect();
             (a.contains(OURS) || b.contains(OURS))
-                .then(|| format!("{label:?}: {a} and {b} conflict on {names:?}"))
+                .then(|| format!("{label:?}: {a} and {b} conflict on {on:?}"))
         })
         .collect();
     (found, ours)

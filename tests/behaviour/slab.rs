@@ -1,10 +1,11 @@
 //! A uniform slab through the unchanged renderer: a model of one's own, and answers in closed form to test against.
 //!
-//! What is drawn is stored as f16, which rounds by at most 2⁻¹¹ = 4.9e-4 of the value.
+//! What is drawn is stored as f16. A device may round or cut (Mesa's software driver cuts): up to 2⁻¹⁰ = 9.8e-4 of the
+//! value.
 
 use std::{f64::consts::PI, path::Path};
 
-use bevy::{camera::Exposure, light::light_consts::lux, math::DVec3, prelude::*};
+use bevy::{light::light_consts::lux, math::DVec3, prelude::*};
 use bevy_cumulus::{
     CloudsPlugin, ModelShader,
     prelude::*,
@@ -12,15 +13,15 @@ use bevy_cumulus::{
 };
 
 use crate::{
-    gpu::{app_with, assert_shaders_compile, run_until, run_updates},
-    view::{Sky, View, cloud_pixels, small_and_still, spawn_sun, spawn_view, until_drawn},
+    gpu::{assert_shaders_compile, run_until, run_updates},
+    view::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, spawn_sun, spawn_view, until_drawn},
 };
 
 const BOTTOM: f64 = 1500.0;
 const TOP: f64 = 2500.0;
 const ALBEDO: [f64; 3] = [0.9, 0.75, 0.5];
-/// Half of the last place of f16, doubled for what f32 adds on the way; and its smallest step.
-const STORED: f64 = 6e-4;
+/// The last place of f16, and a little for what f32 adds on the way; and the smallest step of f16.
+const STORED: f64 = 1.05e-3;
 const LEAST: f64 = 6e-8;
 const SIZE: UVec2 = UVec2::new(9, 7);
 
@@ -86,10 +87,9 @@ fn exact_march(step: f32) -> CloudQuality {
 
 fn slab_app(extinction: f64, sun: Vec3) -> (App, View) {
     let model = ModelShader(slab(extinction));
-    let mut app = app_with(move |app: &mut App| {
+    let mut app = clouds_app_with(move |app: &mut App| {
         app.insert_resource(model.clone()).add_plugins(CloudsPlugin);
     });
-    small_and_still(&mut app);
     app.insert_resource(plain_light());
     spawn_sun(&mut app, -sun);
     let view = spawn_view(&mut app, SIZE, Transform::default(), Sky::Black);
@@ -169,7 +169,7 @@ fn transmittance_and_unshadowed_light_are_exact() {
                 _ if exact > 0.3 => thin += 1,
                 _ => thick += 1,
             }
-            // 1e-6 a step: f32 sums that many.
+            // 1e-7 a step: f32 multiplies that many.
             let allowed = exact * (STORED + extinction * slack + 1e-7 * length / 170.0) + LEAST;
             let error = (f64::from(seen.w) - exact).abs();
             worst = worst.max(error / allowed);
@@ -248,8 +248,8 @@ fn shadowed_light_is_the_integral_along_the_curved_shell() {
         mean /= f64::from(count);
         println!("slab, σt {extinction}: worst {worst:.2e}, mean {mean:.2e}, allowed {tolerance:.2e}, {count} values");
         assert!(count > 600, "only {count} values");
-        // Half steps too many and too few cancel: no offset is left.
-        assert!(mean.abs() < 0.25 * tolerance, "{mean:e} on average");
+        // Half steps too many and too few cancel: only what f16 cuts off is left.
+        assert!(mean.abs() < 0.5 * STORED + 0.1 * tolerance, "{mean:e} on average");
     }
 }
 
@@ -287,8 +287,7 @@ fn long_steps_keep_energy_only_where_they_are_integrated() {
 
 #[test]
 fn a_model_may_come_after_the_plugin_and_change() {
-    let mut app = app_with(CloudsPlugin);
-    small_and_still(&mut app);
+    let mut app = clouds_app();
     app.insert_resource(plain_light()).insert_resource(exact_march(170.0));
     spawn_sun(&mut app, Vec3::NEG_Y);
     let view = spawn_view(&mut app, SIZE, looking(10.0, 60.0), Sky::Black);
@@ -310,7 +309,6 @@ fn a_model_may_come_after_the_plugin_and_change() {
         run_updates(&mut app, 4);
         assert!(matches(&app, extinction), "the slab of {extinction}/m is gone again");
     }
-    assert_eq!(Exposure { ev100: 13.0 }.exposure(), app.world().get::<Exposure>(view.camera).unwrap().exposure());
 }
 
 /// Every `.rs` and `.wesl` file below a folder, with its text.

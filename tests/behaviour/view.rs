@@ -61,12 +61,6 @@ pub fn clouds_app_with<M>(plugins: impl Plugins<M>) -> App {
         .unsupported()
         .map(str::to_owned);
     assert_eq!(unsupported, None, "clouds cannot be drawn on this device");
-    small_and_still(&mut app);
-    app
-}
-
-/// Textures as small as they may be, and a clock that stands still.
-pub fn small_and_still(app: &mut App) {
     app.insert_resource(CloudTextures {
         volume_size: 32,
         map_size: 64,
@@ -79,6 +73,7 @@ pub fn small_and_still(app: &mut App) {
     .insert_resource(TimeUpdateStrategy::ManualDuration(
         std::time::Duration::from_millis(16),
     ));
+    app
 }
 
 /// Spawns a sun that shines along `light`, straight from outside the atmosphere.

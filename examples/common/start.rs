@@ -1,0 +1,103 @@
+//! The command line of examples that show a scene: what is in it, from where, and with which settings.
+
+use std::path::Path;
+
+use anyhow::{Context as _, Result, anyhow, bail};
+use bevy_cumulus::prelude::*;
+use clap::Args;
+
+use crate::common::{CameraPose, PLAIN, SCENES, Scene, SunPose};
+
+/// A scene sets defaults, every other option overrides them, and --set comes last.
+#[derive(Args, Debug)]
+pub struct StartOptions {
+    /// What is in the picture, and from where it is seen
+    #[arg(long, value_name = "NAME")]
+    pub scene: Option<String>,
+    /// The sky: a built-in preset or a file
+    #[arg(long, value_name = "NAME|FILE.ron")]
+    pub preset: Option<String>,
+    /// What the sky may cost
+    #[arg(long, value_parser = ["low", "medium", "high", "ultra"])]
+    pub quality: Option<String>,
+    /// Metres and degrees; y is the altitude, yaw 0 looks along −Z and turns right, fov is vertical (60)
+    #[arg(long, value_name = "X,Y,Z,YAW,PITCH[,FOV]", allow_hyphen_values = true)]
+    pub camera: Option<CameraPose>,
+    /// Degrees; the azimuth is counted as yaw is
+    #[arg(long, value_name = "ELEVATION,AZIMUTH", allow_hyphen_values = true)]
+    pub sun: Option<SunPose>,
+    /// Any setting by its path, such as model.coverage=0.2; may be repeated
+    #[arg(long = "set", value_name = "PATH=VALUE")]
+    pub sets: Vec<String>,
+    /// No atmosphere: black behind the clouds
+    #[arg(long)]
+    pub no_sky: bool,
+}
+
+/// What to start with, with every default filled in and every value checked.
+#[derive(Clone)]
+pub struct Start {
+    pub scene: Scene,
+    pub settings: CloudSettings,
+    pub camera: CameraPose,
+    pub sun: SunPose,
+    pub sky: bool,
+}
+
+impl StartOptions {
+    /// Fills in the defaults, from this scene where none is named, and checks the rest.
+    pub fn start(&self, unnamed: &str) -> Result<Start> {
+        let named = self.scene.as_deref().map(find_scene).transpose()?;
+        let scene = named.or_else(|| Scene::named(unnamed)).unwrap_or(PLAIN);
+        let preset = find_preset(self.preset.as_deref().unwrap_or(scene.preset))?;
+        // A named scene has its sun; where none is named, the advice of a named preset is taken.
+        let advised = preset.sun_elevation.filter(|_| named.is_none() && self.preset.is_some());
+        let elevation = advised.unwrap_or(scene.sun.elevation);
+        Ok(Start {
+            settings: self.settings(preset)?,
+            camera: self.camera.unwrap_or(scene.camera),
+            sun: self.sun.unwrap_or(SunPose { elevation, ..scene.sun }),
+            sky: !self.no_sky,
+            scene,
+        })
+    }
+
+    fn settings(&self, preset: CloudPreset) -> Result<CloudSettings> {
+        let mut settings = CloudSettings {
+            model: preset.model,
+            lighting: preset.lighting,
+            textures: preset.textures,
+            ..Default::default()
+        };
+        if let Some(quality) = self.quality.as_deref().and_then(CloudQuality::named) {
+            settings.quality = quality;
+        }
+        for text in &self.sets {
+            let (path, value) = text
+                .split_once('=')
+                .ok_or_else(|| anyhow!("--set {text}: expected PATH=VALUE, such as model.coverage=0.2"))?;
+            settings.set(path.trim(), value).with_context(|| format!("--set {text}"))?;
+        }
+        settings.validate().context("--set")?;
+        Ok(settings)
+    }
+}
+
+fn find_scene(name: &str) -> Result<Scene> {
+    Scene::named(name).ok_or_else(|| {
+        let known = SCENES.map(|scene| scene.name).join(", ");
+        anyhow!("--scene {name:?}: no such scene; there are {known}")
+    })
+}
+
+fn find_preset(name: &str) -> Result<CloudPreset> {
+    if let Some(preset) = CloudPreset::named(name) {
+        return Ok(preset);
+    }
+    let path = Path::new(name);
+    if path.extension().is_some_and(|extension| extension == "ron") || path.is_file() {
+        return CloudPreset::read(path).context("--preset");
+    }
+    let known = CloudPreset::names().collect::<Vec<_>>().join(", ");
+    bail!("--preset {name:?}: no such preset; there are {known}, or give a .ron file")
+}

@@ -1,0 +1,297 @@
+//! Every setting can be found, described, checked, set by its path, and written and read back.
+
+use std::ops::RangeInclusive;
+
+use bevy::{
+    asset::AssetPlugin,
+    math::DVec3,
+    prelude::*,
+    reflect::{NamedField, ReflectRef, Struct, TypeInfo, Typed},
+};
+use bevy_cumulus::{
+    prelude::*,
+    settings::{CloudSettings, PresetError, SettingsError, Validate, snake_case},
+};
+use serde::{Serialize, de::DeserializeOwned};
+
+/// Settings none of whose parts is the default.
+fn unusual() -> CloudSettings {
+    CloudSettings {
+        model: CloudModel { coverage: -0.125, wind: Vec3::new(-1.5, 0.25, 7.0), erosion: Erosion::Subtract, ..default() },
+        lighting: CloudLighting { octaves: 3, phase: PhaseFunction::TwoLobe, ground_albedo: Vec3::X, ..default() },
+        quality: CloudQuality { integration: Integration::Naive, window: 3, ..CloudQuality::low() },
+        textures: CloudTextures { seed: u32::MAX, volume_size: 64, ..default() },
+        clock: CloudClock { seconds: 1.0e9 + 0.1, speed: -2.5 },
+    }
+}
+
+fn parts(settings: &CloudSettings) -> [(&'static str, &dyn Struct); 5] {
+    [
+        ("model", &settings.model),
+        ("lighting", &settings.lighting),
+        ("quality", &settings.quality),
+        ("textures", &settings.textures),
+        ("clock", &settings.clock),
+    ]
+}
+
+fn field<'a>(settings: &'a CloudSettings, path: &str) -> &'a dyn PartialReflect {
+    let (root, name) = path.split_once('.').expect("a path has two parts");
+    let (_, part) = parts(settings).into_iter().find(|(known, _)| *known == root).expect("a root is a part");
+    part.field(name).expect("a path is a field")
+}
+
+/// The field as [`CloudSettings::set`] takes it.
+fn text_of(field: &dyn PartialReflect) -> String {
+    if let Some(v) = field.try_downcast_ref::<Vec3>() {
+        format!("{},{},{}", v.x, v.y, v.z)
+    } else if let Some(v) = field.try_downcast_ref::<DVec3>() {
+        format!("{},{},{}", v.x, v.y, v.z)
+    } else if let Some(v) = field.try_downcast_ref::<f32>() {
+        v.to_string()
+    } else if let Some(v) = field.try_downcast_ref::<f64>() {
+        v.to_string()
+    } else if let Some(v) = field.try_downcast_ref::<u32>() {
+        v.to_string()
+    } else if let Some(v) = field.try_downcast_ref::<bool>() {
+        v.to_string()
+    } else if let ReflectRef::Enum(v) = field.reflect_ref() {
+        snake_case(v.variant_name())
+    } else {
+        panic!("{:?} has no text", field.reflect_type_path())
+    }
+}
+
+fn declarations<T: Typed>() -> Vec<&'static NamedField> {
+    match T::type_info() {
+        TypeInfo::Struct(info) => info.iter().collect(),
+        other => panic!("{} is not a struct", other.type_path()),
+    }
+}
+
+fn all_declarations() -> Vec<(String, &'static NamedField)> {
+    let named = |root: &str, fields: Vec<&'static NamedField>| {
+        fields.into_iter().map(|f| (format!("{root}.{}", f.name()), f)).collect::<Vec<_>>()
+    };
+    [
+        named("model", declarations::<CloudModel>()),
+        named("lighting", declarations::<CloudLighting>()),
+        named("quality", declarations::<CloudQuality>()),
+        named("textures", declarations::<CloudTextures>()),
+        named("clock", declarations::<CloudClock>()),
+        named("slots", declarations::<CloudTextureSlots>()),
+        named("view", declarations::<CloudView>()),
+    ]
+    .concat()
+}
+
+/// Ends of the range on a field, as text for one number.
+fn range_of(info: &NamedField) -> Option<[String; 2]> {
+    if let Some(r) = info.get_attribute::<RangeInclusive<u32>>() {
+        Some([r.start().to_string(), r.end().to_string()])
+    } else {
+        let r = info.get_attribute::<RangeInclusive<f32>>()?;
+        Some([r.start().to_string(), r.end().to_string()])
+    }
+}
+
+#[test]
+fn every_field_is_described_and_every_number_has_a_range() {
+    for (path, info) in all_declarations() {
+        let docs = info.docs().unwrap_or_default().trim().to_owned();
+        assert!(docs.len() > 20, "{path} has no description: {docs:?}");
+        let slot = path.starts_with("slots.");
+        assert!(slot || docs.to_lowercase().contains("default"), "{path} does not say its default: {docs}");
+        let number = info.is::<f32>() || info.is::<f64>() || info.is::<u32>() || info.is::<Vec3>() || info.is::<DVec3>();
+        // Any number is a good `reset`: it is only compared.
+        if number && path != "view.reset" {
+            let range = range_of(info);
+            let [start, end] = range.unwrap_or_else(|| panic!("{path} has no range"));
+            assert!(start.parse::<f64>().unwrap() < end.parse::<f64>().unwrap(), "{path}: {start} to {end}");
+            let whole = info.get_attribute::<RangeInclusive<u32>>().is_some();
+            assert_eq!(whole, info.is::<u32>(), "{path}: the range is of another type");
+        }
+    }
+}
+
+#[test]
+fn the_contracts_paths_are_there() {
+    let mut settings = CloudSettings::default();
+    let paths = settings.paths();
+    for (path, value) in [
+        ("quality.temporal", "off"),
+        ("quality.temporal", "sliding_window"),
+        ("quality.window", "16"),
+        ("quality.resolution", "full"),
+        ("quality.resolution", "half"),
+        ("quality.resolution", "quarter"),
+        ("quality.step", "40"),
+        ("lighting.octaves", "1"),
+        ("lighting.phase", "henyey_greenstein"),
+        ("lighting.phase", "hg_draine"),
+        ("model.coverage", "0.25"),
+    ] {
+        assert!(paths.iter().any(|known| known == path), "{path} is gone");
+        settings.set(path, value).unwrap_or_else(|error| panic!("{path}={value}: {error}"));
+        assert_eq!(text_of(field(&settings, path)), value, "{path}");
+    }
+    // Each field is reached once, and nothing else is.
+    let fields: Vec<String> = all_declarations().into_iter().map(|(path, _)| path).collect();
+    let settable: Vec<String> =
+        fields.into_iter().filter(|p| !p.starts_with("slots.") && !p.starts_with("view.")).collect();
+    assert_eq!(paths, settable);
+}
+
+#[test]
+fn every_path_takes_its_own_value_and_its_limits_and_no_more() {
+    let declarations = all_declarations();
+    for start in [CloudSettings::default(), unusual()] {
+        for path in start.paths() {
+            let mut settings = start.clone();
+            let own = text_of(field(&settings, &path));
+            settings.set(&path, &own).unwrap_or_else(|error| panic!("{path}={own}: {error}"));
+            assert_eq!(settings, start, "{path}={own} changes something");
+            let info = declarations.iter().find(|(known, _)| *known == path).unwrap().1;
+            let vector = info.is::<Vec3>() || info.is::<DVec3>();
+            let spell = |number: &str| if vector { format!("{own},").replace(&own, &format!("{number},{number},{number}")).trim_end_matches(',').to_owned() } else { number.to_owned() };
+            let mut values: Vec<String> = range_of(info).iter().flatten().map(|end| spell(end)).collect();
+            if info.is::<bool>() {
+                values = vec!["true".to_owned(), "false".to_owned()];
+            } else if let Some(TypeInfo::Enum(choice)) = info.type_info() {
+                values = choice.variant_names().iter().map(|name| snake_case(name)).collect();
+            }
+            assert!(values.len() >= 2, "{path} has no choice");
+            for value in &values {
+                settings.set(&path, value).unwrap_or_else(|error| panic!("{path}={value}: {error}"));
+                assert_eq!(text_of(field(&settings, &path)), *value, "{path}");
+            }
+            let kept = settings.clone();
+            let beyond: Vec<String> = range_of(info).iter().flatten().map(|end| spell(&past(end))).collect();
+            for value in beyond.iter().chain(&["none of these".to_owned(), String::new()]) {
+                let error = settings.set(&path, value).expect_err(&format!("{path}={value:?} passed"));
+                assert!(error.to_string().contains(&path), "{path}={value:?}: {error}");
+                assert_eq!(settings, kept, "{path}={value:?} is refused and changes something");
+            }
+        }
+    }
+    for path in ["", "model", "model.", "model.colour", "sky.coverage", "model.coverage.x"] {
+        let error = CloudSettings::default().set(path, "1").unwrap_err();
+        assert_eq!(error, SettingsError::UnknownPath(path.to_owned()));
+    }
+}
+
+/// A number further out than this limit, on either side; far out where the limit is 0.
+fn past(end: &str) -> String {
+    match end.parse::<f64>().unwrap() {
+        0.0 => "-1".to_owned(),
+        x if x < 0.0 => (2.0 * x).to_string(),
+        // A lower limit above 0: below it, unless it is the upper one, which twice its value passes.
+        x if x <= 100.0 && x.fract() != 0.0 => "-1".to_owned(),
+        x => (2.0 * x + 1.0e6).to_string(),
+    }
+}
+
+fn round_trip<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(value: &T) {
+    let text = ron::to_string(value).expect("it can be written");
+    assert_eq!(ron::from_str::<T>(&text).expect("what is written can be read"), *value, "{text}");
+    let text = serde_json::to_string(value).expect("it can be written");
+    assert_eq!(serde_json::from_str::<T>(&text).expect("what is written can be read"), *value, "{text}");
+}
+
+#[test]
+fn settings_are_read_back_as_written() {
+    for settings in [CloudSettings::default(), unusual()] {
+        round_trip(&settings.model);
+        round_trip(&settings.lighting);
+        round_trip(&settings.quality);
+        round_trip(&settings.textures);
+        round_trip(&settings.clock);
+        round_trip(&CloudView { enabled: false, quality: Some(settings.quality), reset: 7 });
+        round_trip(&CloudPreset {
+            model: settings.model,
+            lighting: settings.lighting,
+            textures: settings.textures,
+            sun_elevation: Some(-3.5),
+        });
+    }
+    round_trip(&CloudView::default());
+    // What is left out is the default.
+    assert_eq!(ron::from_str::<CloudModel>("(coverage: 0.5)").unwrap(), CloudModel { coverage: 0.5, ..default() });
+}
+
+#[test]
+fn presets_parse_validate_and_are_read_back_as_written() {
+    let folder = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("assets/presets");
+    let mut files = 0;
+    for entry in std::fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        let preset = CloudPreset::read(&path).unwrap_or_else(|error| panic!("{error}"));
+        assert_eq!(CloudPreset::parse(&preset.to_ron(), "written").unwrap(), preset, "{}", path.display());
+        let name = path.file_name().unwrap().to_string_lossy().replace(".clouds.ron", "");
+        assert_eq!(CloudPreset::named(&name), Some(preset), "{name} is not built in");
+        files += 1;
+    }
+    assert!(files >= 4 && files == CloudPreset::names().count());
+    for name in CloudPreset::names() {
+        assert!(CloudPreset::named(name).is_some(), "{name}");
+    }
+    let presets: Vec<_> = CloudPreset::names().map(|name| CloudPreset::named(name).unwrap().to_ron()).collect();
+    for (k, preset) in presets.iter().enumerate() {
+        assert!(!presets[..k].contains(preset), "two presets are the same: {preset}");
+    }
+    for name in ["low", "medium", "high", "ultra"] {
+        CloudQuality::named(name).unwrap().validate().unwrap_or_else(|error| panic!("{name}: {error}"));
+    }
+    assert_eq!(CloudQuality::named("best"), None);
+}
+
+#[test]
+fn bad_presets_name_file_line_and_field() {
+    let error = CloudPreset::read("nowhere/sky.clouds.ron".as_ref()).unwrap_err();
+    assert!(matches!(error, PresetError::Io { .. }) && error.to_string().contains("nowhere/sky.clouds.ron"), "{error}");
+    let cases: [(&str, &[&str]); 8] = [
+        ("(\n  model: (\n    colour: 1.0,\n  ),\n)", &["sky.ron:3:", "colour"]),
+        ("(\n  model: (\n    coverage: \"much\",\n  ),\n)", &["sky.ron:3:"]),
+        ("(\n  lighting: (octaves: -1),\n)", &["sky.ron:2:"]),
+        ("(\n  model: (coverage: 0.5", &["sky.ron:2:"]),
+        ("(\n  lighting: (phase: Sideways),\n)", &["sky.ron:2:", "Sideways"]),
+        ("(model: (coverage: 1.5))", &["sky.ron", "model.coverage", "1.5", "-1", "1"]),
+        ("(model: (bottom: 3000.0, top: 2000.0))", &["sky.ron", "model.bottom", "model.top", "3000", "2000"]),
+        ("(textures: (volume_size: 48))", &["sky.ron", "textures.volume_size", "48", "32", "256"]),
+    ];
+    for (text, named) in cases {
+        let error = CloudPreset::parse(text, "sky.ron").expect_err(text).to_string();
+        for name in named {
+            assert!(error.contains(name), "{text}: {error:?} does not name {name:?}");
+        }
+    }
+}
+
+#[test]
+fn preset_files_load_as_assets_without_a_renderer() {
+    let mut app = App::new();
+    app.add_plugins((MinimalPlugins, AssetPlugin::default()))
+        .init_asset::<Image>()
+        .init_asset::<Shader>()
+        .add_plugins(CloudsPlugin);
+    app.finish();
+    app.cleanup();
+    assert!(app.world().resource::<CloudStatus>().unsupported().is_some_and(|why| why.contains("renderer")));
+    let server = app.world().resource::<AssetServer>().clone();
+    let preset: Handle<CloudPreset> = server.load("presets/overcast.clouds.ron");
+    let missing: Handle<CloudPreset> = server.load("presets/nowhere.clouds.ron");
+    for _ in 0..2000 {
+        app.update();
+        if server.is_loaded(&preset) && server.load_state(&missing).is_failed() {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(2));
+    }
+    assert!(server.load_state(&missing).is_failed(), "a missing file loads");
+    let presets = app.world().resource::<Assets<CloudPreset>>();
+    assert_eq!(presets.get(&preset).cloned(), CloudPreset::named("Overcast"));
+    let preset = CloudPreset::named("Overcast").unwrap();
+    preset.apply(app.world_mut());
+    app.update();
+    assert_eq!(*app.world().resource::<CloudModel>(), preset.model);
+}
