@@ -48,6 +48,7 @@ use bevy::{
         render_resource::{DownlevelFlags, TextureFormat, TextureUsages},
         renderer::{RenderAdapter, RenderDevice},
     },
+    shader::ShaderLoader,
 };
 
 pub use model::ModelShader;
@@ -75,6 +76,13 @@ pub struct CloudsPlugin;
 
 impl Plugin for CloudsPlugin {
     fn build(&self, app: &mut App) {
+        // Without Bevy's renderer, as on a server, nobody else has made room for these.
+        if !app.world().contains_resource::<Assets<Shader>>() {
+            app.init_asset::<Shader>().init_asset_loader::<ShaderLoader>();
+        }
+        if !app.world().contains_resource::<Assets<Image>>() {
+            app.init_asset::<Image>();
+        }
         app.add_plugins((
             settings::CloudSettingsPlugin,
             textures::CloudTexturesPlugin,

@@ -176,4 +176,4 @@ pub(super) fn plain_docs(docs: Option<&str>) -> String {
 
 #[cfg(test)]
 #[path = "fields_tests.rs"]
-mod tests;
+pub(super) mod tests;

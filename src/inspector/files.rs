@@ -21,8 +21,9 @@ const EXTENSION: &str = ".clouds.ron";
 pub(super) const RED: Color32 = Color32::from_rgb(255, 110, 90);
 
 /// What the presets' part of the panel remembers.
-#[derive(Default)]
 pub(super) struct PresetState {
+    /// Parsed once.
+    built_in: Vec<(&'static str, CloudPreset)>,
     path: String,
     /// What came of the last load or save.
     said: Option<Result<String, String>>,
@@ -30,17 +31,23 @@ pub(super) struct PresetState {
     sun_elevation: Option<f32>,
 }
 
+impl Default for PresetState {
+    fn default() -> Self {
+        let built_in = CloudPreset::names().filter_map(|name| Some((name, CloudPreset::named(name)?)));
+        Self { built_in: built_in.collect(), path: String::new(), said: None, sun_elevation: None }
+    }
+}
+
 impl PresetState {
     /// Shows the presets. Returns one that was chosen or loaded; it is already validated.
     pub fn ui(&mut self, ui: &mut Ui, current: &CloudPreset) -> Option<CloudPreset> {
         let mut chosen = None;
         ui.horizontal_wrapped(|ui| {
-            for name in CloudPreset::names() {
-                let Some(preset) = CloudPreset::named(name) else { continue };
-                let here = is_same(&preset, current);
-                if ui.selectable_label(here, name).clicked() && !here {
+            for (name, preset) in &self.built_in {
+                let here = is_same(preset, current);
+                if ui.selectable_label(here, *name).clicked() && !here {
                     self.said = None;
-                    chosen = Some(preset);
+                    chosen = Some(preset.clone());
                 }
             }
         });
@@ -111,12 +118,7 @@ fn write(preset: &CloudPreset, path: &str) -> Result<(), String> {
 
 /// The preset that the settings amount to.
 pub(super) fn current(model: &CloudModel, lighting: &CloudLighting, textures: &CloudTextures) -> CloudPreset {
-    CloudPreset {
-        model: model.clone(),
-        lighting: lighting.clone(),
-        textures: textures.clone(),
-        sun_elevation: None,
-    }
+    CloudPreset { model: model.clone(), lighting: lighting.clone(), textures: textures.clone(), sun_elevation: None }
 }
 
 /// What the texture slots' part of the panel remembers, by the slot's name.

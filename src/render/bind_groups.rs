@@ -1,21 +1,18 @@
-//! Layouts, pipelines and bind groups of all stages. Built on demand: a variant a stage for atmosphere and MSAA.
+//! Each view's bind groups, made anew every frame as Bevy does.
 
 use bevy::{
-    asset::load_embedded_asset,
-    core_pipeline::FullscreenShader,
     pbr::{
         GpuAtmosphereSettings,
         resources::{
-            AtmosphereSampler, AtmosphereTextures, AtmosphereTransform, AtmosphereTransforms,
+            AtmosphereSampler, AtmosphereTextures, AtmosphereTransforms,
             AtmosphereTransformsOffset, GpuAtmosphere,
         },
     },
-    platform::collections::HashMap,
     prelude::*,
     render::{
         extract_component::{ComponentUniforms, DynamicUniformIndex},
         render_asset::RenderAssets,
-        render_resource::{binding_types::*, *},
+        render_resource::*,
         renderer::RenderDevice,
         texture::GpuImage,
         view::{ExtractedView, Msaa, ViewDepthStencilTexture},
@@ -24,44 +21,11 @@ use bevy::{
 
 use super::{
     StatusFlags,
-    frame::FrameUniform,
     history::CloudHistory,
+    pipelines::{CloudPipelines, SKY_LIGHT_BYTES, Variant},
     view::{CloudUniforms, ExtractedCloudView},
 };
 use crate::{model::ModelBindings, textures::CloudTextureViews};
-
-/// What a stage's pipeline depends on.
-#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
-pub(crate) struct Variant {
-    atmosphere: bool,
-    multisampled: bool,
-    target: TextureFormat,
-}
-
-/// Pipelines of one variant.
-#[derive(Clone, Copy)]
-struct Pipelines {
-    sky: CachedComputePipelineId,
-    march: CachedComputePipelineId,
-    accumulate: CachedComputePipelineId,
-    composite: CachedRenderPipelineId,
-    publish: CachedComputePipelineId,
-}
-
-/// Layouts, shaders, and the pipelines made so far.
-#[derive(Resource)]
-pub(crate) struct CloudPipelines {
-    empty: BindGroupLayoutDescriptor,
-    air: BindGroupLayoutDescriptor,
-    sky: BindGroupLayoutDescriptor,
-    march: [BindGroupLayoutDescriptor; 2],
-    accumulate: BindGroupLayoutDescriptor,
-    composite: [BindGroupLayoutDescriptor; 2],
-    publish: [BindGroupLayoutDescriptor; 2],
-    shaders: [Handle<Shader>; 5],
-    fullscreen: FullscreenShader,
-    made: HashMap<Variant, Pipelines>,
-}
 
 /// One view's bind groups and pipelines for this frame.
 #[derive(Component)]
@@ -81,193 +45,6 @@ pub(crate) struct CloudBindGroups {
 /// A view's ambient light, written by the sky stage.
 #[derive(Component)]
 pub(crate) struct SkyLightBuffer(Buffer);
-
-const SKY_LIGHT_BYTES: u64 = 32;
-
-fn depth_layout(multisampled: bool) -> BindGroupLayoutEntryBuilder {
-    if multisampled { texture_depth_2d_multisampled() } else { texture_depth_2d() }
-}
-
-impl FromWorld for CloudPipelines {
-    fn from_world(world: &mut World) -> Self {
-        let compute = ShaderStages::COMPUTE;
-        let unfiltered = TextureSampleType::Float { filterable: false };
-        let filtered = TextureSampleType::Float { filterable: true };
-        let bytes = std::num::NonZeroU64::new(SKY_LIGHT_BYTES);
-        let frame = || uniform_buffer::<FrameUniform>(false);
-        let write = |format| texture_storage_2d(format, StorageTextureAccess::WriteOnly);
-        let march = |multisampled| {
-            BindGroupLayoutDescriptor::new(
-                "cloud_march",
-                &BindGroupLayoutEntries::sequential(
-                    compute,
-                    (
-                        frame(),
-                        storage_buffer_read_only_sized(false, bytes),
-                        texture_2d(unfiltered),
-                        depth_layout(multisampled),
-                        write(TextureFormat::Rgba16Float),
-                        write(TextureFormat::Rg32Float),
-                        uniform_buffer::<Mat4>(false),
-                    ),
-                ),
-            )
-        };
-        let composite = |multisampled| {
-            BindGroupLayoutDescriptor::new(
-                "cloud_composite",
-                &BindGroupLayoutEntries::sequential(
-                    ShaderStages::FRAGMENT,
-                    (
-                        frame(),
-                        texture_2d(unfiltered),
-                        texture_2d(unfiltered),
-                        depth_layout(multisampled),
-                    ),
-                ),
-            )
-        };
-        let publish = |multisampled| {
-            BindGroupLayoutDescriptor::new(
-                "cloud_publish",
-                &BindGroupLayoutEntries::sequential(
-                    compute,
-                    (
-                        frame(),
-                        texture_2d(unfiltered),
-                        texture_2d(unfiltered),
-                        depth_layout(multisampled),
-                        write(TextureFormat::Rgba32Float),
-                    ),
-                ),
-            )
-        };
-        Self {
-            empty: BindGroupLayoutDescriptor::new("cloud_empty", &[]),
-            // Binding numbers are Bevy's, so that its atmosphere's own functions can be imported.
-            air: BindGroupLayoutDescriptor::new(
-                "cloud_air",
-                &BindGroupLayoutEntries::with_indices(
-                    compute,
-                    (
-                        (0, uniform_buffer::<GpuAtmosphere>(true)),
-                        (1, uniform_buffer::<GpuAtmosphereSettings>(true)),
-                        (2, uniform_buffer::<AtmosphereTransform>(true)),
-                        (8, texture_2d(filtered)),
-                        (10, texture_2d(filtered)),
-                        (11, texture_3d(filtered)),
-                        (12, sampler(SamplerBindingType::Filtering)),
-                    ),
-                ),
-            ),
-            sky: BindGroupLayoutDescriptor::new(
-                "cloud_sky",
-                &BindGroupLayoutEntries::sequential(
-                    compute,
-                    (frame(), storage_buffer_sized(false, bytes), uniform_buffer::<Mat4>(false)),
-                ),
-            ),
-            march: [march(false), march(true)],
-            accumulate: BindGroupLayoutDescriptor::new(
-                "cloud_accumulate",
-                &BindGroupLayoutEntries::sequential(
-                    compute,
-                    (
-                        frame(),
-                        texture_2d_array(unfiltered),
-                        texture_2d(unfiltered),
-                        write(TextureFormat::Rgba32Float),
-                    ),
-                ),
-            ),
-            composite: [composite(false), composite(true)],
-            publish: [publish(false), publish(true)],
-            shaders: [
-                load_embedded_asset!(world, "sky/sky.wesl"),
-                load_embedded_asset!(world, "march/march.wesl"),
-                load_embedded_asset!(world, "accumulate/accumulate.wesl"),
-                load_embedded_asset!(world, "composite/composite.wesl"),
-                load_embedded_asset!(world, "composite/publish.wesl"),
-            ],
-            fullscreen: world.resource::<FullscreenShader>().clone(),
-            made: HashMap::default(),
-        }
-    }
-}
-
-impl CloudPipelines {
-    fn get(&mut self, cache: &PipelineCache, model: &ModelBindings, variant: Variant) -> Pipelines {
-        if let Some(made) = self.made.get(&variant) {
-            return *made;
-        }
-        let mut defs: Vec<bevy::shader::ShaderDefVal> = Vec::new();
-        if variant.atmosphere {
-            defs.push("ATMOSPHERE".into());
-        }
-        if variant.multisampled {
-            defs.push("MULTISAMPLED".into());
-        }
-        let ms = usize::from(variant.multisampled);
-        let air = if variant.atmosphere { &self.air } else { &self.empty };
-        let compute = |label: &'static str, shader: usize, layout: [&BindGroupLayoutDescriptor; 3]| {
-            cache.queue_compute_pipeline(ComputePipelineDescriptor {
-                label: Some(label.into()),
-                layout: layout.into_iter().cloned().collect(),
-                shader: self.shaders[shader].clone(),
-                shader_defs: defs.clone(),
-                entry_point: Some("main".into()),
-                ..default()
-            })
-        };
-        let premultiplied = BlendState {
-            color: BlendComponent {
-                src_factor: BlendFactor::One,
-                dst_factor: BlendFactor::SrcAlpha,
-                operation: BlendOperation::Add,
-            },
-            alpha: BlendComponent {
-                src_factor: BlendFactor::Zero,
-                dst_factor: BlendFactor::One,
-                operation: BlendOperation::Add,
-            },
-        };
-        let composite = cache.queue_render_pipeline(RenderPipelineDescriptor {
-            label: Some("cloud_composite".into()),
-            layout: vec![self.empty.clone(), self.empty.clone(), self.composite[ms].clone()],
-            vertex: self.fullscreen.to_vertex_state(),
-            fragment: Some(FragmentState {
-                shader: self.shaders[3].clone(),
-                shader_defs: defs.clone(),
-                entry_point: Some("main".into()),
-                targets: vec![Some(ColorTargetState {
-                    format: variant.target,
-                    blend: Some(premultiplied),
-                    write_mask: ColorWrites::ALL,
-                })],
-                ..default()
-            }),
-            ..default()
-        });
-        let made = Pipelines {
-            sky: compute("cloud_sky", 0, [air, &self.empty, &self.sky]),
-            march: compute("cloud_march", 1, [air, &model.layout, &self.march[ms]]),
-            accumulate: compute("cloud_accumulate", 2, [&self.empty, &self.empty, &self.accumulate]),
-            composite,
-            publish: compute("cloud_publish", 4, [&self.empty, &self.empty, &self.publish[ms]]),
-        };
-        self.made.insert(variant, made);
-        made
-    }
-}
-
-impl Pipelines {
-    fn ready(self, cache: &PipelineCache) -> bool {
-        [self.sky, self.march, self.accumulate, self.publish]
-            .iter()
-            .all(|id| cache.get_compute_pipeline(*id).is_some())
-            && cache.get_render_pipeline(self.composite).is_some()
-    }
-}
 
 /// Bevy's atmosphere on a view.
 type Air = (

@@ -5,6 +5,7 @@ mod buffer;
 mod frame;
 pub(crate) mod history;
 mod passes;
+mod pipelines;
 mod status;
 mod view;
 
@@ -50,7 +51,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
     render_app
         .init_resource::<view::ExtractedClouds>()
         .init_gpu_resource::<ModelBindings>()
-        .init_gpu_resource::<bind_groups::CloudPipelines>()
+        .init_gpu_resource::<pipelines::CloudPipelines>()
         .add_systems(ExtractSchedule, (view::extract_settings, view::extract_views))
         .add_systems(
             Render,

@@ -59,8 +59,8 @@ pub struct CloudLighting {
     #[reflect(@5.0..=50.0_f32)]
     pub droplet_diameter: f32,
     /// Upper bound of a phase value (1/sr). The diffraction peak of real droplets reaches 10²…10⁴ within a
-    /// degree of the sun and would alias; what is cut there is lost (about a tenth of the peak's energy at 12
-    /// µm). Default 30.
+    /// degree of the sun and would alias. What is cut there is lost: at 12 µm and 30, 28 % of single scattering,
+    /// all of it within 1.6° of the sun. Default 30.
     #[reflect(@0.1..=100_000.0_f32)]
     pub phase_limit: f32,
     /// Factor on the sun's illuminance. Default 1: as the scene's light says.

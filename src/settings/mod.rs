@@ -76,10 +76,20 @@ macro_rules! kept {
 kept!(CloudModel => model, CloudLighting => lighting, CloudQuality => quality,
       CloudTextures => textures, CloudClock => clock);
 
-fn keep_good<S: Kept>(setting: Option<Res<S>>, mut good: ResMut<GoodSettings>) {
+fn keep_good<S: Kept>(setting: Option<Res<S>>, mut good: ResMut<GoodSettings>, mut reported: Local<Option<String>>) {
     let Some(setting) = setting.filter(|s| s.is_changed()) else { return };
     match setting.validate() {
-        Ok(()) => S::slot(&mut good.0).clone_from(&setting),
-        Err(error) => error!("clouds: {error}; the last good value stays"),
+        Ok(()) => {
+            S::slot(&mut good.0).clone_from(&setting);
+            *reported = None;
+        }
+        Err(error) => {
+            // The clock changes every frame: the same mistake is told once.
+            let text = error.to_string();
+            if reported.as_ref() != Some(&text) {
+                error!("clouds: {text}; the last good value stays");
+                *reported = Some(text);
+            }
+        }
     }
 }

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::CloudQuality;
+use super::{CloudQuality, Validate};
 
 /// Draws clouds in this camera's view. Opt-in, like `Bloom`; the camera needs a perspective projection.
 ///
@@ -49,7 +49,7 @@ impl Default for CloudClock {
 /// Advances [`CloudClock`] by the app's time.
 pub(crate) fn advance_clock(mut clock: ResMut<CloudClock>, time: Res<Time>) {
     let step = time.delta_secs_f64() * f64::from(clock.speed);
-    if step != 0.0 && step.is_finite() {
+    if step != 0.0 && clock.validate().is_ok() {
         clock.seconds += step;
     }
 }

@@ -1,13 +1,15 @@
 //! Bad input is reported by name; the last good value stays, and nothing panics.
 
 use bevy::{
-    camera::Viewport,
+    camera::RenderTarget,
+    ecs::component::Mutable,
     prelude::*,
     render::{
         RenderApp, RenderPlugin,
         render_resource::{TextureFormat, TextureUsages, WgpuLimits},
         settings::WgpuSettings,
     },
+    window::{WindowRef, WindowResolution},
 };
 use bevy_cumulus::{CloudFrame, prelude::*, settings::SettingsError, settings::Validate};
 
@@ -39,7 +41,10 @@ fn is_bare(app: &App, view: &View) -> bool {
 type Bad<S> = (&'static str, fn(&mut S));
 
 /// Makes each change, and asks that it be reported and the picture stay as it is.
-fn refuses<S: Resource<Mutability = bevy::ecs::component::Mutable> + Validate + Clone>(app: &mut App, view: &View, changes: &[Bad<S>]) {
+fn refuses<S>(app: &mut App, view: &View, changes: &[Bad<S>])
+where
+    S: Resource<Mutability = Mutable> + Validate + Clone,
+{
     let good = app.world().resource::<S>().clone();
     let picture = cloud_pixels(app, view);
     for (says, change) in changes {
@@ -65,46 +70,79 @@ fn bad_settings_are_reported_and_change_nothing() {
     let view = spawn_linear(&mut app, SIZE, looking_up());
     until_drawn(&mut app);
     settle(&mut app);
-    refuses::<CloudModel>(&mut app, &view, &[
-        ("model.coverage = 7.5 is outside its range -1 to 1", |m| m.coverage = 7.5),
-        ("model.density = -0.5 is outside its range 0 to 10", |m| m.density = -0.5),
-        ("model.extinction = NaN is outside its range 0 to 1", |m| m.extinction = f32::NAN),
-        ("model.map_scale = inf is outside", |m| m.map_scale = f32::INFINITY),
-        ("model.albedo.y = -1 is outside", |m| m.albedo.y = -1.0),
-        ("model.wind.x = NaN is outside", |m| m.wind.x = f32::NAN),
-        ("model.world_offset.z = 1e30", |m| m.world_offset.z = 1e30),
-        ("model.top = 1000 must be above model.bottom = 2000", |m| (m.bottom, m.top) = (2000.0, 1000.0)),
-        ("model.top = 1234 must be above model.bottom = 1234", |m| (m.bottom, m.top) = (1234.0, 1234.0)),
-    ]);
-    refuses::<CloudLighting>(&mut app, &view, &[
-        ("lighting.octaves = 4000000000 is outside its range 0 to 16", |l| l.octaves = 4_000_000_000),
-        ("lighting.g = 1 is outside its range -0.99 to 0.99", |l| l.g = 1.0),
-        ("lighting.phase_limit = NaN is outside", |l| l.phase_limit = f32::NAN),
-        ("lighting.sun_strength = -2 is outside", |l| l.sun_strength = -2.0),
-        ("lighting.droplet_diameter = 0 is outside its range 5 to 50", |l| l.droplet_diameter = 0.0),
-    ]);
-    refuses::<CloudQuality>(&mut app, &view, &[
-        ("quality.step = 0 is outside its range 0.5 to 5000", |q| q.step = 0.0),
-        ("quality.step = NaN is outside", |q| q.step = f32::NAN),
-        ("quality.window = 0 is outside its range 1 to 16", |q| q.window = 0),
-        ("quality.max_steps = 4294967295 is outside", |q| q.max_steps = u32::MAX),
-        ("quality.max_distance = -5 is outside", |q| q.max_distance = -5.0),
-        ("quality.long_step = 0 is outside its range 1 to 16", |q| q.long_step = 0),
-    ]);
-    refuses::<CloudTextures>(&mut app, &view, &[
-        ("textures.volume_size = 48 must be a power of two from 32 to 256", |t| t.volume_size = 48),
-        ("textures.map_size = 1000000000 is outside", |t| t.map_size = 1_000_000_000),
-        ("textures.billow_cells = 0 is outside its range 1 to 32", |t| t.billow_cells = 0),
-    ]);
-    refuses::<CloudClock>(&mut app, &view, &[
-        ("clock.seconds = NaN is outside", |c| c.seconds = f64::NAN),
-        ("clock.speed = -20000 is outside its range -10000 to 10000", |c| c.speed = -20000.0),
-    ]);
+    refuses::<CloudModel>(
+        &mut app,
+        &view,
+        &[
+            ("model.coverage = 7.5 is outside its range -1 to 1", |m| m.coverage = 7.5),
+            ("model.density = -0.5 is outside its range 0 to 10", |m| m.density = -0.5),
+            ("model.extinction = NaN is outside its range 0 to 1", |m| m.extinction = f32::NAN),
+            ("model.map_scale = inf is outside", |m| m.map_scale = f32::INFINITY),
+            ("model.albedo.y = -1 is outside", |m| m.albedo.y = -1.0),
+            ("model.wind.x = NaN is outside", |m| m.wind.x = f32::NAN),
+            ("model.world_offset.z = 1000000000000000000000000000000 is outside", |m| m.world_offset.z = 1e30),
+            ("model.top = 1000 must be above model.bottom = 2000", |m| (m.bottom, m.top) = (2000.0, 1000.0)),
+            ("model.top = 1234 must be above model.bottom = 1234", |m| (m.bottom, m.top) = (1234.0, 1234.0)),
+        ],
+    );
+    refuses::<CloudLighting>(
+        &mut app,
+        &view,
+        &[
+            ("lighting.octaves = 4000000000 is outside its range 0 to 16", |l| l.octaves = 4_000_000_000),
+            ("lighting.g = 1 is outside its range -0.99 to 0.99", |l| l.g = 1.0),
+            ("lighting.phase_limit = NaN is outside", |l| l.phase_limit = f32::NAN),
+            ("lighting.sun_strength = -2 is outside", |l| l.sun_strength = -2.0),
+            ("lighting.droplet_diameter = 0 is outside its range 5 to 50", |l| l.droplet_diameter = 0.0),
+        ],
+    );
+    refuses::<CloudQuality>(
+        &mut app,
+        &view,
+        &[
+            ("quality.step = 0 is outside its range 0.5 to 5000", |q| q.step = 0.0),
+            ("quality.step = NaN is outside", |q| q.step = f32::NAN),
+            ("quality.window = 0 is outside its range 1 to 16", |q| q.window = 0),
+            ("quality.max_steps = 4294967295 is outside", |q| q.max_steps = u32::MAX),
+            ("quality.max_distance = -5 is outside", |q| q.max_distance = -5.0),
+            ("quality.long_step = 0 is outside its range 1 to 16", |q| q.long_step = 0),
+        ],
+    );
+    refuses::<CloudTextures>(
+        &mut app,
+        &view,
+        &[
+            ("textures.volume_size = 48 must be a power of two from 32 to 256", |t| t.volume_size = 48),
+            ("textures.map_size = 1000000000 is outside", |t| t.map_size = 1_000_000_000),
+            ("textures.billow_cells = 0 is outside its range 1 to 32", |t| t.billow_cells = 0),
+        ],
+    );
+    refuses::<CloudClock>(
+        &mut app,
+        &view,
+        &[
+            ("clock.seconds = NaN is outside", |c| c.seconds = f64::NAN),
+            ("clock.speed = -20000 is outside its range -10000 to 10000", |c| c.speed = -20000.0),
+        ],
+    );
     // Good values are taken, or all of the above would prove nothing.
     let picture = cloud_pixels(&app, &view);
     app.world_mut().resource_mut::<CloudModel>().coverage = 0.3;
     settle(&mut app);
     assert!(cloud_pixels(&app, &view) != picture, "a good value changes nothing either");
+}
+
+#[test]
+fn a_bad_clock_stands_still() {
+    let (mut app, _) = above_one_camera();
+    app.insert_resource(CloudClock { seconds: 5.0, speed: 34_567.0 });
+    run_updates(&mut app, 3);
+    assert_eq!(app.world().resource::<CloudClock>().seconds, 5.0);
+    assert_eq!(times_logged("clock.speed = 34567 is outside"), 1, "not reported once");
+    app.world_mut().resource_mut::<CloudClock>().speed = 100.0;
+    run_updates(&mut app, 2);
+    // The first update of the two takes 16 ms as well.
+    assert_eq!(app.world().resource::<CloudClock>().seconds, 5.0 + 2.0 * 0.016 * 100.0);
 }
 
 #[test]
@@ -121,19 +159,20 @@ fn a_views_bad_quality_falls_back_to_the_resource() {
     assert!(cloud_pixels(&app, &view) != picture, "a good quality of its own changes nothing");
 }
 
-/// Makes the view bad, asks for no clouds and no trace of them, and for all of them once it is good again.
-fn is_refused_and_recovers(what: &str, shown: bool, spoil: fn(&mut App, &View), mend: fn(&mut App, &View)) {
+/// Makes the view bad, asks for no clouds and where its target is still `drawn` for no trace of them, and for all of
+/// them once it is good again.
+fn is_refused_and_recovers(what: &str, drawn: bool, spoil: fn(&mut App, &View), mend: fn(&mut App, &View)) {
     let (mut app, view) = above_one_camera();
     let picture = linear_pixels(&app, &view);
     spoil(&mut app, &view);
     settle(&mut app);
-    if shown {
+    if drawn {
         assert!(is_bare(&app, &view), "{what}: clouds are drawn");
+        let left = render_components(&app, view.camera);
+        let kept = ["CloudHistory", "CloudBindGroups", "CloudUniforms"];
+        assert!(!left.iter().any(|name| kept.iter().any(|k| name.contains(k))), "{what}: {left:?} are left");
+        assert!(!app.world().resource::<CloudStatus>().is_ready(), "{what}: ready to draw nothing");
     }
-    let left = render_components(&app, view.camera);
-    let kept = ["CloudHistory", "CloudBindGroups", "CloudUniforms"];
-    assert!(!left.iter().any(|name| kept.iter().any(|k| name.contains(k))), "{what}: {left:?} are left");
-    assert!(!app.world().resource::<CloudStatus>().is_ready(), "{what}: ready to draw nothing");
     mend(&mut app, &view);
     settle(&mut app);
     assert_eq!(linear_pixels(&app, &view), picture, "{what}: not the same once mended");
@@ -160,7 +199,9 @@ fn a_near_plane_of_zero_shows_no_clouds() {
     is_refused_and_recovers(
         "near = 0",
         true,
-        |app, view| set_projection(app, view, Projection::Perspective(PerspectiveProjection { near: 0.0, ..default() })),
+        |app, view| {
+            set_projection(app, view, Projection::Perspective(PerspectiveProjection { near: 0.0, ..default() }))
+        },
         |app, view| set_projection(app, view, Projection::default()),
     );
 }
@@ -194,15 +235,19 @@ fn a_camera_at_the_planets_centre_shows_no_clouds() {
 }
 
 #[test]
-fn a_view_without_pixels_is_waited_out() {
-    fn set_viewport(app: &mut App, view: &View, viewport: Option<Viewport>) {
-        app.world_mut().get_mut::<Camera>(view.camera).unwrap().viewport = viewport;
-    }
+fn a_minimised_window_is_waited_out() {
+    // A viewport of no size is not tried: Bevy's own light clusters fail validation there.
     is_refused_and_recovers(
-        "an empty viewport",
+        "minimised",
         false,
-        |app, view| set_viewport(app, view, Some(Viewport { physical_size: UVec2::new(0, 9), ..default() })),
-        |app, view| set_viewport(app, view, None),
+        |app, view| {
+            let window = app.world_mut().spawn(Window { resolution: WindowResolution::new(0, 0), ..default() }).id();
+            let target = RenderTarget::Window(WindowRef::Entity(window));
+            app.world_mut().entity_mut(view.camera).insert(target);
+        },
+        |app, view| {
+            app.world_mut().entity_mut(view.camera).insert(RenderTarget::from(view.target.clone()));
+        },
     );
 }
 
@@ -225,7 +270,9 @@ fn a_target_may_change_its_size() {
 #[test]
 fn from_any_height_all_numbers_are_finite() {
     let (mut app, view) = above_one_camera();
-    for (height, seen) in [(-1000.0, true), (-1.0e6, false), (0.0, true), (2000.0, true), (1.0e5, false), (1.0e7, false)] {
+    for (height, seen) in
+        [(-1000.0, true), (-1.0e6, false), (0.0, true), (2000.0, true), (1.0e5, false), (1.0e7, false)]
+    {
         for pitch in [-90.0_f32, -20.0, 35.0, 90.0] {
             let turned = Quat::from_rotation_x(pitch.to_radians());
             let placed = Transform::from_xyz(0.0, height, 0.0).with_rotation(turned);
@@ -314,4 +361,25 @@ fn errors_name_field_value_and_range() {
     let error = CloudModel { coverage: 2.0, ..default() }.validate().unwrap_err();
     let SettingsError::OutOfRange { field, value, min, max } = &error else { panic!("{error:?}") };
     assert_eq!([field, value, min, max], ["model.coverage", "2", "-1", "1"]);
+}
+
+#[test]
+fn without_a_renderer_nothing_happens() {
+    // As on a server: with the asset server and nothing else, and with all of Bevy but a GPU.
+    let mut bare = App::new();
+    bare.add_plugins((MinimalPlugins, bevy::asset::AssetPlugin::default()));
+    let mut server = App::new();
+    let no_gpu = RenderPlugin { render_creation: WgpuSettings { backends: None, ..default() }.into(), ..default() };
+    server.add_plugins(headless_plugins().set(no_gpu));
+    for mut app in [bare, server] {
+        app.add_plugins(CloudsPlugin);
+        app.finish();
+        app.cleanup();
+        app.world_mut().spawn((Transform::default(), CloudView::default()));
+        for _ in 0..3 {
+            app.update();
+        }
+        let status = app.world().resource::<CloudStatus>();
+        assert!(status.unsupported().is_some_and(|why| why.contains("no renderer")) && !status.is_ready());
+    }
 }

@@ -45,9 +45,7 @@ fn model_app() -> App {
     });
     // So that the baking that the small sizes ask for has begun, and ended.
     run_updates(&mut app, 3);
-    run_until(&mut app, "the textures are baked", 600, |app| {
-        !app.world().resource::<CloudTextureStatus>().baking
-    });
+    run_until(&mut app, "the textures are baked", 600, |app| !app.world().resource::<CloudTextureStatus>().baking);
     app
 }
 
@@ -56,8 +54,7 @@ fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer>
     let camera = DVec3::new(12_345.0, 10.0, -6789.0);
     let group = ModelShader::bindings(app, camera).expect("the model can be bound");
     let count = questions.len();
-    let answers =
-        run_compute_with(app, ASK, Some(&group), questions.as_flattened(), 4 * count, count as u32);
+    let answers = run_compute_with(app, ASK, Some(&group), questions.as_flattened(), 4 * count, count as u32);
     answers.as_chunks().0.to_vec()
 }
 
@@ -113,7 +110,7 @@ fn nothing_is_denser_than_the_bound_around_it() {
             let [bound, density, extinction, profile] = *answer;
             assert!(answer.iter().all(|v| v.is_finite() && *v >= 0.0), "model {k}: {question:?}: {answer:?}");
             assert!(bound > 0.0 || density == 0.0, "model {k}: {question:?}: {density} where the bound is 0");
-            // Of the texture unit's fixed-point weights: 2⁻⁸ of a difference, at worst.
+            // Of rounding: both are sums of a few products.
             let allowed = bound + model.density * 1e-5;
             assert!(density <= allowed, "model {k}: {question:?}: {density} > {bound}");
             assert!((extinction - density * model.extinction).abs() <= 1e-6 * extinction);
@@ -126,7 +123,7 @@ fn nothing_is_denser_than_the_bound_around_it() {
         }
         println!("model {k}: {empty} certainly empty, {cloud} in cloud, density up to {close} of the bound");
         // A bound that is never 0 would be true and of no use.
-        assert!(empty > 3000 && cloud > 300, "model {k}: {empty} certainly empty, {cloud} in cloud");
+        assert!(empty > 3000 && cloud > 150, "model {k}: {empty} certainly empty, {cloud} in cloud");
     }
 }
 

@@ -5,13 +5,12 @@ use bevy::{
     render::{
         RenderApp,
         render_resource::{
-            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
-            BufferDescriptor, BufferUsages, CachedPipelineState, CommandEncoderDescriptor,
-            ComputePassDescriptor, ComputePipeline, ComputePipelineDescriptor, Extent3d, Origin3d,
-            Pipeline, PipelineCache, ShaderStages, StorageTextureAccess, TexelCopyBufferInfo,
-            TexelCopyBufferLayout, TexelCopyTextureInfo, Texture, TextureDescriptor,
-            TextureDimension, TextureFormat, TextureSampleType, TextureUsages,
-            TextureViewDescriptor, TextureViewDimension,
+            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer, BufferDescriptor,
+            BufferUsages, CachedPipelineState, CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline,
+            ComputePipelineDescriptor, Extent3d, Origin3d, Pipeline, PipelineCache, ShaderStages, StorageTextureAccess,
+            TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, Texture, TextureDescriptor,
+            TextureDimension, TextureFormat, TextureSampleType, TextureUsages, TextureViewDescriptor,
+            TextureViewDimension,
             binding_types::{texture_2d, texture_2d_array, texture_storage_2d, uniform_buffer_sized},
         },
         renderer::{RenderDevice, RenderQueue},
@@ -77,17 +76,12 @@ fn layouts() -> [BindGroupLayoutDescriptor; 2] {
             texture_storage_2d(TextureFormat::Rgba32Float, StorageTextureAccess::WriteOnly),
         ),
     );
-    [
-        BindGroupLayoutDescriptor::new("test nothing", &[]),
-        BindGroupLayoutDescriptor::new("test accumulation", &own),
-    ]
+    [BindGroupLayoutDescriptor::new("test nothing", &[]), BindGroupLayoutDescriptor::new("test accumulation", &own)]
 }
 
 fn pipeline(app: &mut App) -> ComputePipeline {
-    let shader = app
-        .world()
-        .resource::<AssetServer>()
-        .load("embedded://bevy_cumulus/render/accumulate/accumulate.wesl");
+    let shader =
+        app.world().resource::<AssetServer>().load("embedded://bevy_cumulus/render/accumulate/accumulate.wesl");
     let [empty, own] = layouts();
     let descriptor = ComputePipelineDescriptor {
         label: Some("test accumulation".into()),
@@ -96,11 +90,7 @@ fn pipeline(app: &mut App) -> ComputePipeline {
         entry_point: Some("main".into()),
         ..default()
     };
-    let id = app
-        .sub_app(RenderApp)
-        .world()
-        .resource::<PipelineCache>()
-        .queue_compute_pipeline(descriptor);
+    let id = app.sub_app(RenderApp).world().resource::<PipelineCache>().queue_compute_pipeline(descriptor);
     for _ in 0..100 {
         run_updates(app, 1);
         let cache = app.sub_app(RenderApp).world().resource::<PipelineCache>();
@@ -139,10 +129,8 @@ impl Accumulation {
         });
         let frames = texture(TextureFormat::Rgba16Float, LAYERS);
         let sums = [0, 1].map(|_| texture(TextureFormat::Rgba32Float, 1));
-        let all = frames.create_view(&TextureViewDescriptor {
-            dimension: Some(TextureViewDimension::D2Array),
-            ..default()
-        });
+        let all =
+            frames.create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() });
         let views = sums.each_ref().map(|t| t.create_view(&TextureViewDescriptor::default()));
         let [empty, own] = layouts().map(|l| cache.get_bind_group_layout(&l));
         let groups = [0, 1].map(|parity| {
@@ -159,15 +147,10 @@ impl Accumulation {
         let world = app.sub_app(RenderApp).world();
         let (device, queue) = (world.resource::<RenderDevice>(), world.resource::<RenderQueue>());
         let layer = self.index % LAYERS;
-        let texels = TexelCopyTextureInfo {
-            origin: Origin3d { z: layer, ..Origin3d::ZERO },
-            ..self.frames.as_image_copy()
-        };
+        let texels =
+            TexelCopyTextureInfo { origin: Origin3d { z: layer, ..Origin3d::ZERO }, ..self.frames.as_image_copy() };
         write(queue, texels, 8, bytemuck::cast_slice(frame));
-        let values = [
-            [SIZE.x, SIZE.y, 1, self.index & 255],
-            [layer, (self.index + 1) % LAYERS, LAYERS, self.held],
-        ];
+        let values = [[SIZE.x, SIZE.y, 1, self.index & 255], [layer, (self.index + 1) % LAYERS, LAYERS, self.held]];
         for (place, value) in self.places.iter().zip(values) {
             queue.write_buffer(&self.uniform, *place as u64, bytemuck::cast_slice(&value));
         }

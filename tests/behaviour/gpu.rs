@@ -22,10 +22,9 @@ use bevy::{
         error_handler::{RenderErrorHandler, RenderErrorPolicy},
         pipelined_rendering::PipelinedRenderingPlugin,
         render_resource::{
-            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer,
-            BufferDescriptor, BufferInitDescriptor, BufferUsages, CachedPipelineState,
-            CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline,
-            ComputePipelineDescriptor, MapMode, Pipeline, PipelineCache, PollType, ShaderStages,
+            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer, BufferDescriptor,
+            BufferInitDescriptor, BufferUsages, CachedPipelineState, CommandEncoderDescriptor, ComputePassDescriptor,
+            ComputePipeline, ComputePipelineDescriptor, MapMode, Pipeline, PipelineCache, PollType, ShaderStages,
             binding_types::{storage_buffer_read_only_sized, storage_buffer_sized},
         },
         renderer::{RenderDevice, RenderQueue},
@@ -40,22 +39,14 @@ const COMPILE_UPDATES: u32 = 30;
 
 /// Whether the tests run under WebGPU's limits, where Bevy's own `Atmosphere` fails validation.
 pub fn webgpu_limits() -> bool {
-    std::env::var("WGPU_SETTINGS_PRIO")
-        .is_ok_and(|priority| priority.eq_ignore_ascii_case("webgpu"))
+    std::env::var("WGPU_SETTINGS_PRIO").is_ok_and(|priority| priority.eq_ignore_ascii_case("webgpu"))
 }
 
 /// Bevy's plugins without a window, in lock step: one update is one whole frame.
 pub fn headless_plugins() -> PluginGroupBuilder {
     let plugins = DefaultPlugins
-        .set(WindowPlugin {
-            primary_window: None,
-            exit_condition: ExitCondition::DontExit,
-            ..default()
-        })
-        .set(RenderPlugin {
-            synchronous_pipeline_compilation: true,
-            ..default()
-        })
+        .set(WindowPlugin { primary_window: None, exit_condition: ExitCondition::DontExit, ..default() })
+        .set(RenderPlugin { synchronous_pipeline_compilation: true, ..default() })
         .disable::<WinitPlugin>()
         .disable::<PipelinedRenderingPlugin>();
     // The logger is the process's, not the app's.
@@ -126,11 +117,7 @@ pub fn shader_app() -> App {
     let mut shaders = app.world_mut().resource_mut::<Assets<Shader>>();
     for file in files {
         let text = std::fs::read_to_string(&file).unwrap();
-        let module = file
-            .strip_prefix(&source)
-            .unwrap()
-            .to_string_lossy()
-            .replace('\\', "/");
+        let module = file.strip_prefix(&source).unwrap().to_string_lossy().replace('\\', "/");
         let shader = Shader::from_wesl(text, format!("embedded://bevy_cumulus/{module}"));
         // Kept for the app's life, as `load_shader_library!` does.
         std::mem::forget(shaders.add(shader));
@@ -143,10 +130,7 @@ fn wesl_files(folder: &Path, found: &mut BTreeSet<std::path::PathBuf>) {
         let path = entry.unwrap().path();
         if path.is_dir() {
             wesl_files(&path, found);
-        } else if path
-            .extension()
-            .is_some_and(|extension| extension == "wesl")
-        {
+        } else if path.extension().is_some_and(|extension| extension == "wesl") {
             found.insert(path);
         }
     }
@@ -173,15 +157,9 @@ pub fn run_until(app: &mut App, what: &str, limit: u32, mut done: impl FnMut(&mu
 
 /// Fails with the compiler's text where a shader of the app does not compile.
 pub fn assert_shaders_compile(app: &App) {
-    for pipeline in app
-        .sub_app(RenderApp)
-        .world()
-        .resource::<PipelineCache>()
-        .pipelines()
-    {
+    for pipeline in app.sub_app(RenderApp).world().resource::<PipelineCache>().pipelines() {
         if let CachedPipelineState::Err(
-            error @ (ShaderCacheError::ProcessShaderError(_)
-            | ShaderCacheError::CreateShaderModule(_)),
+            error @ (ShaderCacheError::ProcessShaderError(_) | ShaderCacheError::CreateShaderModule(_)),
         ) = &pipeline.state
         {
             panic!("a shader does not compile: {error}");
@@ -192,10 +170,7 @@ pub fn assert_shaders_compile(app: &App) {
 /// Waits until the GPU has done all that was submitted.
 pub fn wait_for_gpu(app: &App) {
     let device = app.world().resource::<RenderDevice>();
-    device
-        .wgpu_device()
-        .poll(PollType::wait_indefinitely())
-        .expect("the GPU stopped answering");
+    device.wgpu_device().poll(PollType::wait_indefinitely()).expect("the GPU stopped answering");
 }
 
 /// Runs a WESL module's `main` (`@compute @workgroup_size(64)`) in one dispatch of at least `invocations` and returns
@@ -206,13 +181,7 @@ pub fn wait_for_gpu(app: &App) {
 ///
 /// # Panics
 /// With the compiler's text where the shader does not compile, and on any error that the device reports.
-pub fn run_compute(
-    app: &mut App,
-    wesl: &str,
-    input: &[f32],
-    output_len: usize,
-    invocations: u32,
-) -> Vec<f32> {
+pub fn run_compute(app: &mut App, wesl: &str, input: &[f32], output_len: usize, invocations: u32) -> Vec<f32> {
     run_compute_with(app, wesl, None, input, output_len, invocations)
 }
 
@@ -229,25 +198,14 @@ pub fn run_compute_with(
         "test compute",
         &BindGroupLayoutEntries::sequential(
             ShaderStages::COMPUTE,
-            (
-                storage_buffer_read_only_sized(false, None),
-                storage_buffer_sized(false, None),
-            ),
+            (storage_buffer_read_only_sized(false, None), storage_buffer_sized(false, None)),
         ),
     );
     let mut layouts = vec![own];
     layouts.extend(group_1.map(|(layout, _)| layout.clone()));
     let pipeline = compile(app, wesl, &layouts);
     let other = group_1.map(|(_, group)| group);
-    let result = dispatch(
-        app,
-        &pipeline,
-        &layouts[0],
-        other,
-        input,
-        output_len,
-        invocations,
-    );
+    let result = dispatch(app, &pipeline, &layouts[0], other, input, output_len, invocations);
     // Errors of the commands above come out here.
     app.update();
     result
@@ -255,10 +213,7 @@ pub fn run_compute_with(
 
 fn compile(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> ComputePipeline {
     static NEXT: AtomicU32 = AtomicU32::new(0);
-    let path = format!(
-        "embedded://behaviour/compute_{}.wesl",
-        NEXT.fetch_add(1, Ordering::Relaxed)
-    );
+    let path = format!("embedded://behaviour/compute_{}.wesl", NEXT.fetch_add(1, Ordering::Relaxed));
     let shader = Shader::from_wesl(wesl.to_owned(), path);
     let shader = app.world_mut().resource_mut::<Assets<Shader>>().add(shader);
     let descriptor = ComputePipelineDescriptor {
@@ -268,11 +223,7 @@ fn compile(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> 
         entry_point: Some("main".into()),
         ..default()
     };
-    let id = app
-        .sub_app(RenderApp)
-        .world()
-        .resource::<PipelineCache>()
-        .queue_compute_pipeline(descriptor);
+    let id = app.sub_app(RenderApp).world().resource::<PipelineCache>().queue_compute_pipeline(descriptor);
     let mut waiting_for = String::new();
     for _ in 0..COMPILE_UPDATES {
         app.update();
@@ -285,8 +236,7 @@ fn compile(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> 
                 return pipeline;
             }
             CachedPipelineState::Err(
-                error @ (ShaderCacheError::ShaderNotLoaded(_)
-                | ShaderCacheError::ShaderImportNotYetAvailable),
+                error @ (ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable),
             ) => waiting_for = error.to_string(),
             CachedPipelineState::Err(error) => {
                 panic!("the shader does not compile: {error}\n{wesl}")
@@ -315,20 +265,13 @@ fn dispatch(
         usage: BufferUsages::STORAGE,
     });
     let buffer = |usage| {
-        device.create_buffer(&BufferDescriptor {
-            label: Some("test output"),
-            size,
-            usage,
-            mapped_at_creation: false,
-        })
+        device.create_buffer(&BufferDescriptor { label: Some("test output"), size, usage, mapped_at_creation: false })
     };
     let output = buffer(BufferUsages::STORAGE | BufferUsages::COPY_SRC);
     let readable = buffer(BufferUsages::MAP_READ | BufferUsages::COPY_DST);
     let group = device.create_bind_group(
         "test compute",
-        &world
-            .resource::<PipelineCache>()
-            .get_bind_group_layout(layout),
+        &world.resource::<PipelineCache>().get_bind_group_layout(layout),
         &BindGroupEntries::sequential((input.as_entire_binding(), output.as_entire_binding())),
     );
     let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
@@ -351,9 +294,7 @@ fn dispatch(
 /// The contents of a buffer with usage `MAP_READ`, once the GPU has done all that was submitted.
 pub fn read_mapped<T: bytemuck::Pod>(app: &App, buffer: &Buffer) -> Vec<T> {
     let slice = buffer.slice(..);
-    slice.map_async(MapMode::Read, |result| {
-        result.expect("the buffer cannot be mapped")
-    });
+    slice.map_async(MapMode::Read, |result| result.expect("the buffer cannot be mapped"));
     wait_for_gpu(app);
     let mapped = slice.get_mapped_range().expect("the buffer is not mapped");
     let values = bytemuck::pod_collect_to_vec(&mapped);
@@ -387,31 +328,19 @@ fn a_test_shader_runs_over_its_buffers() {
 #[test]
 #[should_panic(expected = "does not compile")]
 fn a_test_shader_with_a_wrong_type_fails() {
-    run_compute(
-        &mut shader_app(),
-        &DOUBLE.replace("2.0 *", "true *"),
-        &[1.0],
-        1,
-        1,
-    );
+    run_compute(&mut shader_app(), &DOUBLE.replace("2.0 *", "true *"), &[1.0], 1, 1);
 }
 
 #[test]
 #[should_panic(expected = "is not ready")]
 fn a_test_shader_that_imports_what_is_not_there_fails() {
-    let shader = format!(
-        "import bevy_cumulus::model::nowhere::nothing;\n{}",
-        DOUBLE.replace("2.0", "nothing()")
-    );
+    let shader = format!("import bevy_cumulus::model::nowhere::nothing;\n{}", DOUBLE.replace("2.0", "nothing()"));
     run_compute(&mut shader_app(), &shader, &[1.0], 1, 1);
 }
 
 #[test]
 #[should_panic(expected = "the GPU reported")]
 fn a_pipeline_that_does_not_fit_its_layout_fails() {
-    let shader = DOUBLE.replace(
-        "var<storage, read> values",
-        "var<storage, read_write> values",
-    );
+    let shader = DOUBLE.replace("var<storage, read> values", "var<storage, read_write> values");
     run_compute(&mut shader_app(), &shader, &[1.0], 1, 1);
 }

@@ -6,9 +6,7 @@ use bevy::{
     light::{Atmosphere, Skybox, atmosphere::ScatteringMedium},
     pbr::AtmosphereSettings,
     prelude::*,
-    render::render_resource::{
-        Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension,
-    },
+    render::render_resource::{Extent3d, TextureDimension, TextureFormat, TextureViewDescriptor, TextureViewDimension},
 };
 use bevy_cumulus::prelude::*;
 
@@ -25,8 +23,7 @@ const SIZE: UVec2 = UVec2::new(48, 32);
 /// Tangent of half the default field of view, 45°.
 const HALF: f32 = 0.414_213_56;
 const GREY: Vec3 = Vec3::new(0.6, 0.5, 0.4);
-const RESOLUTIONS: [MarchResolution; 3] =
-    [MarchResolution::Full, MarchResolution::Half, MarchResolution::Quarter];
+const RESOLUTIONS: [MarchResolution; 3] = [MarchResolution::Full, MarchResolution::Half, MarchResolution::Quarter];
 
 /// Every marched resolution with and without MSAA.
 fn for_each_way(app: &mut App, view: &View, mut check: impl FnMut(&mut App, MarchResolution, Msaa)) {

@@ -24,10 +24,7 @@ fn drawn() -> App {
 
 /// Conflicts of our systems whose order is open, in words, and how many systems of ours the schedule has.
 fn open_conflicts(world: &World, label: InternedScheduleLabel) -> (Vec<String>, usize) {
-    let schedule = world
-        .resource::<Schedules>()
-        .get(label)
-        .unwrap_or_else(|| panic!("there is no schedule {label:?}"));
+    let schedule = world.resource::<Schedules>().get(label).unwrap_or_else(|| panic!("there is no schedule {label:?}"));
     let names: HashMap<SystemKey, String> = schedule
         .systems()
         .unwrap_or_else(|_| panic!("{label:?} has not run"))
@@ -40,12 +37,9 @@ fn open_conflicts(world: &World, label: InternedScheduleLabel) -> (Vec<String>, 
         .iter()
         .filter_map(|(a, b, components)| {
             let [a, b] = [a, b].map(|key| names.get(key).map_or("?", String::as_str));
-            let on: Vec<String> = components
-                .iter()
-                .filter_map(|id| Some(world.components().get_name(*id)?.to_string()))
-                .collect();
-            (a.contains(OURS) || b.contains(OURS))
-                .then(|| format!("{label:?}: {a} and {b} conflict on {on:?}"))
+            let on: Vec<String> =
+                components.iter().filter_map(|id| Some(world.components().get_name(*id)?.to_string())).collect();
+            (a.contains(OURS) || b.contains(OURS)).then(|| format!("{label:?}: {a} and {b} conflict on {on:?}"))
         })
         .collect();
     (found, ours)
@@ -55,17 +49,9 @@ fn open_conflicts(world: &World, label: InternedScheduleLabel) -> (Vec<String>, 
 fn no_system_of_ours_is_ambiguous() {
     let app = drawn();
     let main = [First.intern(), PreStartup.intern(), PreUpdate.intern(), Last.intern()];
-    let render = [
-        ExtractSchedule.intern(),
-        Render.intern(),
-        RenderGraph.intern(),
-        Core3d.intern(),
-    ];
+    let render = [ExtractSchedule.intern(), Render.intern(), RenderGraph.intern(), Core3d.intern()];
     let render_world = app.sub_app(RenderApp).world();
-    let worlds = main
-        .map(|label| (app.world(), label))
-        .into_iter()
-        .chain(render.map(|label| (render_world, label)));
+    let worlds = main.map(|label| (app.world(), label)).into_iter().chain(render.map(|label| (render_world, label)));
     let mut found = Vec::new();
     for (world, label) in worlds {
         let (conflicts, ours) = open_conflicts(world, label);

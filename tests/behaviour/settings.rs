@@ -6,7 +6,7 @@ use bevy::{
     asset::AssetPlugin,
     math::DVec3,
     prelude::*,
-    reflect::{NamedField, ReflectRef, Struct, TypeInfo, Typed},
+    reflect::{NamedField, ReflectRef, TypeInfo, Typed, structs::Struct},
 };
 use bevy_cumulus::{
     prelude::*,
@@ -17,7 +17,12 @@ use serde::{Serialize, de::DeserializeOwned};
 /// Settings none of whose parts is the default.
 fn unusual() -> CloudSettings {
     CloudSettings {
-        model: CloudModel { coverage: -0.125, wind: Vec3::new(-1.5, 0.25, 7.0), erosion: Erosion::Subtract, ..default() },
+        model: CloudModel {
+            coverage: -0.125,
+            wind: Vec3::new(-1.5, 0.25, 7.0),
+            erosion: Erosion::Subtract,
+            ..default()
+        },
         lighting: CloudLighting { octaves: 3, phase: PhaseFunction::TwoLobe, ground_albedo: Vec3::X, ..default() },
         quality: CloudQuality { integration: Integration::Naive, window: 3, ..CloudQuality::low() },
         textures: CloudTextures { seed: u32::MAX, volume_size: 64, ..default() },
@@ -102,7 +107,8 @@ fn every_field_is_described_and_every_number_has_a_range() {
         assert!(docs.len() > 20, "{path} has no description: {docs:?}");
         let slot = path.starts_with("slots.");
         assert!(slot || docs.to_lowercase().contains("default"), "{path} does not say its default: {docs}");
-        let number = info.is::<f32>() || info.is::<f64>() || info.is::<u32>() || info.is::<Vec3>() || info.is::<DVec3>();
+        let number =
+            info.is::<f32>() || info.is::<f64>() || info.is::<u32>() || info.is::<Vec3>() || info.is::<DVec3>();
         // Any number is a good `reset`: it is only compared.
         if number && path != "view.reset" {
             let range = range_of(info);
@@ -153,7 +159,7 @@ fn every_path_takes_its_own_value_and_its_limits_and_no_more() {
             assert_eq!(settings, start, "{path}={own} changes something");
             let info = declarations.iter().find(|(known, _)| *known == path).unwrap().1;
             let vector = info.is::<Vec3>() || info.is::<DVec3>();
-            let spell = |number: &str| if vector { format!("{own},").replace(&own, &format!("{number},{number},{number}")).trim_end_matches(',').to_owned() } else { number.to_owned() };
+            let spell = |n: &str| if vector { format!("{n},{n},{n}") } else { n.to_owned() };
             let mut values: Vec<String> = range_of(info).iter().flatten().map(|end| spell(end)).collect();
             if info.is::<bool>() {
                 values = vec!["true".to_owned(), "false".to_owned()];
@@ -166,7 +172,7 @@ fn every_path_takes_its_own_value_and_its_limits_and_no_more() {
                 assert_eq!(text_of(field(&settings, &path)), *value, "{path}");
             }
             let kept = settings.clone();
-            let beyond: Vec<String> = range_of(info).iter().flatten().map(|end| spell(&past(end))).collect();
+            let beyond: Vec<String> = range_of(info).map(beyond).iter().flatten().map(|n| spell(n)).collect();
             for value in beyond.iter().chain(&["none of these".to_owned(), String::new()]) {
                 let error = settings.set(&path, value).expect_err(&format!("{path}={value:?} passed"));
                 assert!(error.to_string().contains(&path), "{path}={value:?}: {error}");
@@ -180,15 +186,11 @@ fn every_path_takes_its_own_value_and_its_limits_and_no_more() {
     }
 }
 
-/// A number further out than this limit, on either side; far out where the limit is 0.
-fn past(end: &str) -> String {
-    match end.parse::<f64>().unwrap() {
-        0.0 => "-1".to_owned(),
-        x if x < 0.0 => (2.0 * x).to_string(),
-        // A lower limit above 0: below it, unless it is the upper one, which twice its value passes.
-        x if x <= 100.0 && x.fract() != 0.0 => "-1".to_owned(),
-        x => (2.0 * x + 1.0e6).to_string(),
-    }
+/// Numbers below and above the range, by more than its length.
+fn beyond([start, end]: [String; 2]) -> [String; 2] {
+    let [start, end] = [start, end].map(|n| n.parse::<f64>().expect("a range has numbers"));
+    let far = end - start + 1.0;
+    [start - far, end + far].map(|n| n.to_string())
 }
 
 fn round_trip<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(value: &T) {
@@ -270,10 +272,7 @@ fn bad_presets_name_file_line_and_field() {
 #[test]
 fn preset_files_load_as_assets_without_a_renderer() {
     let mut app = App::new();
-    app.add_plugins((MinimalPlugins, AssetPlugin::default()))
-        .init_asset::<Image>()
-        .init_asset::<Shader>()
-        .add_plugins(CloudsPlugin);
+    app.add_plugins((MinimalPlugins, AssetPlugin::default(), CloudsPlugin));
     app.finish();
     app.cleanup();
     assert!(app.world().resource::<CloudStatus>().unsupported().is_some_and(|why| why.contains("renderer")));

@@ -14,7 +14,7 @@ use bevy::{
 
 use crate::{
     gpu::{run_updates, webgpu_limits},
-    view::{Sky, clouds_app, cloud_pixels, spawn_sun, spawn_view, until_drawn},
+    view::{Sky, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
 };
 
 /// What tells one variant of a pipeline from another: label, definitions, format drawn to.

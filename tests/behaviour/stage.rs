@@ -118,7 +118,7 @@ pub fn render_components(app: &App, camera: Entity) -> Vec<String> {
     let Some(entity) = app.world().get::<RenderEntity>(camera) else { return Vec::new() };
     let world = app.sub_app(RenderApp).world();
     let infos = world.inspect_entity(entity.id()).expect("the camera is in the render world");
-    infos.map(|info| info.name().to_string()).filter(|name| name.contains("cumulus")).collect()
+    infos.map(|(_, info)| info.name().to_string()).filter(|name| name.contains("cumulus")).collect()
 }
 
 /// Greatest difference of two pictures in any pixel and channel.

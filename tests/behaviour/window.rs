@@ -28,29 +28,17 @@ struct Watched {
 }
 
 fn quality(window: u32) -> CloudQuality {
-    CloudQuality {
-        resolution: MarchResolution::Full,
-        step: 160.0,
-        light_steps: 2,
-        window,
-        ..default()
-    }
+    CloudQuality { resolution: MarchResolution::Full, step: 160.0, light_steps: 2, window, ..default() }
 }
 
 fn watched_app() -> (App, Watched) {
     let mut app = clouds_app();
     app.insert_resource(quality(4));
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
-    let looking =
-        Transform::from_xyz(0.0, 10.0, 0.0).looking_to(Vec3::new(0.0, 0.4, -1.0), Vec3::Y);
+    let looking = Transform::from_xyz(0.0, 10.0, 0.0).looking_to(Vec3::new(0.0, 0.4, -1.0), Vec3::Y);
     let view = spawn_view(&mut app, SIZE, looking, Sky::Black);
-    let frame = app
-        .world_mut()
-        .resource_mut::<Assets<Image>>()
-        .add(CloudFrame::image(SIZE.x, SIZE.y));
-    app.world_mut()
-        .entity_mut(view.camera)
-        .insert(CloudFrame(frame.clone()));
+    let frame = app.world_mut().resource_mut::<Assets<Image>>().add(CloudFrame::image(SIZE.x, SIZE.y));
+    app.world_mut().entity_mut(view.camera).insert(CloudFrame(frame.clone()));
     until_drawn(&mut app);
     // So that nothing is still being baked or loaded.
     run_updates(&mut app, 3);
@@ -73,9 +61,7 @@ impl Watched {
 
     /// The part that the view covers now.
     fn cropped(&self, picture: &Picture) -> Picture {
-        let rows = picture
-            .chunks(SIZE.x as usize)
-            .take(self.size.y as usize);
+        let rows = picture.chunks(SIZE.x as usize).take(self.size.y as usize);
         rows.flat_map(|row| &row[..self.size.x as usize]).copied().collect()
     }
 }
@@ -91,10 +77,7 @@ fn start_over(app: &mut App, watched: &Watched) {
 
 fn mean(pictures: &[Picture]) -> Picture {
     (0..pictures[0].len())
-        .map(|i| {
-            [0, 1, 2, 3]
-                .map(|c| pictures.iter().map(|p| p[i][c]).sum::<f64>() / pictures.len() as f64)
-        })
+        .map(|i| [0, 1, 2, 3].map(|c| pictures.iter().map(|p| p[i][c]).sum::<f64>() / pictures.len() as f64))
         .collect()
 }
 
@@ -136,8 +119,7 @@ fn rounding_to_half_floats_costs_less_than_a_thousandth() {
     app.insert_resource(quality(5));
     // The same five frames at exposures within a stop of each other round differently, so that the mean over all of them is
     // that of unrounded frames (less the 4e-4 that a device takes off which cuts). The last place of f16 is 9.8e-4 at most.
-    let exposures: Vec<f32> =
-        (0..12).map(|k| Exposure { ev100: 13.0 + k as f32 / 12.0 }.exposure()).collect();
+    let exposures: Vec<f32> = (0..12).map(|k| Exposure { ev100: 13.0 + k as f32 / 12.0 }.exposure()).collect();
     let mut means = Vec::new();
     for (k, exposure) in (0..).zip(&exposures) {
         let ev100 = 13.0 + k as f32 / 12.0;
@@ -151,9 +133,8 @@ fn rounding_to_half_floats_costs_less_than_a_thousandth() {
         means.push(shown.iter().map(|p| [0, 1, 2].map(|c| p[c] * brightness)).collect::<Vec<_>>());
     }
     let flat: Vec<Vec<f64>> = means.iter().map(|p| p.as_flattened().to_vec()).collect();
-    let unrounded: Vec<f64> = (0..flat[0].len())
-        .map(|i| flat.iter().map(|p| p[i]).sum::<f64>() / flat.len() as f64)
-        .collect();
+    let unrounded: Vec<f64> =
+        (0..flat[0].len()).map(|i| flat.iter().map(|p| p[i]).sum::<f64>() / flat.len() as f64).collect();
     let errors: Vec<f64> = flat.iter().map(|p| worst_relative(p, &unrounded, 1e-3)).collect();
     println!("window of rounded frames against unrounded ones: {errors:?}");
     assert!(errors.iter().all(|e| *e < 1e-3), "{errors:?}");
