@@ -26,32 +26,15 @@ struct Args {
 }
 
 fn main() -> anyhow::Result<()> {
-    let Args {
-        size,
-        seed,
-        sigma,
-        out,
-    } = Args::parse();
+    let Args { size, seed, sigma, out } = Args::parse();
     let progress = ProgressBar::new_spinner().with_message(format!("generating {size} × {size}"));
     progress.enable_steady_tick(Duration::from_millis(100));
     let rgba = generate(BlueNoiseParams { size, seed, sigma })?;
     if let Some(folder) = out.parent() {
-        std::fs::create_dir_all(folder)
-            .with_context(|| format!("cannot create {}", folder.display()))?;
+        std::fs::create_dir_all(folder).with_context(|| format!("cannot create {}", folder.display()))?;
     }
-    image::save_buffer_with_format(
-        &out,
-        &rgba,
-        size,
-        size,
-        ExtendedColorType::Rgba8,
-        ImageFormat::Png,
-    )
-    .with_context(|| format!("cannot write {}", out.display()))?;
-    progress.finish_with_message(format!(
-        "wrote {} in {}",
-        out.display(),
-        HumanDuration(progress.elapsed())
-    ));
+    image::save_buffer_with_format(&out, &rgba, size, size, ExtendedColorType::Rgba8, ImageFormat::Png)
+        .with_context(|| format!("cannot write {}", out.display()))?;
+    progress.finish_with_message(format!("wrote {} in {}", out.display(), HumanDuration(progress.elapsed())));
     Ok(())
 }

@@ -54,8 +54,8 @@ use bevy::{
 pub use model::ModelShader;
 pub use render::{CloudBuffer, CloudFrame, CloudStatus};
 pub use settings::{
-    CloudClock, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
-    CloudTextures, CloudView,
+    CloudClock, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures,
+    CloudView,
 };
 
 /// What most users need.
@@ -128,12 +128,9 @@ fn missing_capability(world: &World) -> Option<String> {
             return Some(format!("{name}: {what} is {has}, and clouds need {needs}"));
         }
     }
-    for format in [
-        TextureFormat::Rgba8Unorm,
-        TextureFormat::Rgba16Float,
-        TextureFormat::Rgba32Float,
-        TextureFormat::Rg32Float,
-    ] {
+    for format in
+        [TextureFormat::Rgba8Unorm, TextureFormat::Rgba16Float, TextureFormat::Rgba32Float, TextureFormat::Rg32Float]
+    {
         if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {
             return Some(format!("{name}: {format:?} cannot be a storage texture"));
         }

@@ -63,7 +63,7 @@ pub const SCENES: [Scene; 5] = [
         camera: CameraPose::new(0.0, 2.0, 0.0, 0.0, 15.0),
         sun: SunPose::new(42.0, 40.0),
         hills: false,
-        ev_offset: -1.0,
+        ev_offset: -0.5,
     },
     Scene {
         name: "sunset",
@@ -169,11 +169,11 @@ impl SunPose {
         Transform::from_rotation(heading(self.azimuth, self.elevation) * back)
     }
 
-    /// An exposure at which the sky looks as bright as it does to the eye (EV100): 14 by day, 10.5 at sunset and
+    /// An exposure at which the sky looks as bright as it does to the eye (EV100): 13.5 by day, 10.5 at sunset and
     /// 5 at the end of twilight.
     pub fn ev100(&self) -> f32 {
         let t = self.elevation;
-        if t >= 0.0 { 10.5 + 3.5 * (t / 25.0).min(1.0) } else { (10.5 + t * 0.45).max(5.0) }
+        if t >= 0.0 { 10.5 + 3.0 * (t / 25.0).min(1.0) } else { (10.5 + t * 0.45).max(5.0) }
     }
 }
 

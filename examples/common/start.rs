@@ -38,6 +38,9 @@ pub struct StartOptions {
 #[derive(Clone)]
 pub struct Start {
     pub scene: Scene,
+    /// The scene's name, where one was given.
+    pub named: Option<&'static str>,
+    pub preset: String,
     pub settings: CloudSettings,
     pub camera: CameraPose,
     pub sun: SunPose,
@@ -45,16 +48,20 @@ pub struct Start {
 }
 
 impl StartOptions {
-    /// Fills in the defaults, from this scene where none is named, and checks the rest.
-    pub fn start(&self, unnamed: &str) -> Result<Start> {
+    /// Fills in the defaults, from this scene where none is named (else the plain one) and this clock, and checks the
+    /// rest.
+    pub fn start(&self, unnamed: Option<&str>, clock: CloudClock) -> Result<Start> {
         let named = self.scene.as_deref().map(find_scene).transpose()?;
-        let scene = named.or_else(|| Scene::named(unnamed)).unwrap_or(PLAIN);
-        let preset = find_preset(self.preset.as_deref().unwrap_or(scene.preset))?;
-        // A named scene has its sun; where none is named, the advice of a named preset is taken.
-        let advised = preset.sun_elevation.filter(|_| named.is_none() && self.preset.is_some());
+        let scene = named.or_else(|| Scene::named(unnamed?)).unwrap_or(PLAIN);
+        let preset_name = self.preset.as_deref().unwrap_or(scene.preset);
+        let preset = find_preset(preset_name)?;
+        // A scene has its sun; else the preset's advice is taken.
+        let advised = preset.sun_elevation.filter(|_| named.is_none() && (unnamed.is_none() || self.preset.is_some()));
         let elevation = advised.unwrap_or(scene.sun.elevation);
         Ok(Start {
-            settings: self.settings(preset)?,
+            settings: self.settings(preset, clock)?,
+            preset: preset_name.to_owned(),
+            named: named.map(|scene| scene.name),
             camera: self.camera.unwrap_or(scene.camera),
             sun: self.sun.unwrap_or(SunPose { elevation, ..scene.sun }),
             sky: !self.no_sky,
@@ -62,16 +69,18 @@ impl StartOptions {
         })
     }
 
-    fn settings(&self, preset: CloudPreset) -> Result<CloudSettings> {
+    fn settings(&self, preset: CloudPreset, clock: CloudClock) -> Result<CloudSettings> {
         let mut settings = CloudSettings {
             model: preset.model,
             lighting: preset.lighting,
             textures: preset.textures,
+            clock,
             ..Default::default()
         };
         if let Some(quality) = self.quality.as_deref().and_then(CloudQuality::named) {
             settings.quality = quality;
         }
+        settings.validate().context("settings")?;
         for text in &self.sets {
             let (path, value) = text
                 .split_once('=')

@@ -65,13 +65,14 @@ fn main() -> AppExit {
 }
 
 fn fly(options: &Options) -> Result<AppExit> {
-    let start = options.start.start("hills")?;
+    let start = options.start.start(Some("hills"), CloudClock::default())?;
     // The window library panics instead.
     let display =
         ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(|name| std::env::var_os(name).is_some());
     ensure!(display || !cfg!(target_os = "linux"), "there is no display: set DISPLAY, or use the headless example");
     let settings = start.settings.clone();
-    let window = Window { title: "bevy_cumulus".into(), resolution: options.size.into(), ..default() };
+    let title = format!("bevy_cumulus: {}, {}", start.named.unwrap_or(start.scene.name), start.preset);
+    let window = Window { title, resolution: options.size.into(), ..default() };
     let speed = if settings.clock.speed == 0.0 { 1.0 } else { settings.clock.speed };
     let flight = Flight { sun: start.sun, presets: keys::Presets::new(), help: !options.bare, speed, start };
     let mut app = App::new();

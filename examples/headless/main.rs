@@ -7,6 +7,8 @@ mod common;
 mod options;
 mod output;
 mod shoot;
+#[path = "../common/start.rs"]
+mod start;
 mod status;
 mod timings;
 
@@ -17,8 +19,8 @@ use std::{
     sync::{Arc, Mutex},
 };
 
-use bevy_cumulus::prelude::*;
 use anyhow::{Context as _, Result, anyhow, bail};
+use bevy_cumulus::prelude::*;
 use clap::Parser as _;
 use options::Options;
 

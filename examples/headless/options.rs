@@ -2,13 +2,16 @@
 
 use std::path::{Path, PathBuf};
 
-use bevy_cumulus::prelude::*;
-use anyhow::{Context as _, Result, anyhow, bail};
+use anyhow::Result;
 use bevy::math::Vec3;
+use bevy_cumulus::prelude::*;
 use clap::Parser;
 use serde::Serialize;
 
-use crate::common::{CameraPose, PLAIN, SCENES, Scene, SunPose, exactly};
+use crate::{
+    common::{CameraPose, Scene, SunPose, exactly},
+    start::{Start, StartOptions},
+};
 
 /// Makes a picture of a sky without a window.
 ///
@@ -19,31 +22,18 @@ pub struct Options {
     /// Print the names of scenes, presets and settable paths, one a line
     #[arg(long)]
     pub list: bool,
-    /// What is in the picture, and from where it is seen
-    #[arg(long, value_name = "NAME")]
-    pub scene: Option<String>,
-    /// The sky: a built-in preset or a file
-    #[arg(long, value_name = "NAME|FILE.ron")]
-    pub preset: Option<String>,
-    /// What the sky may cost
-    #[arg(long, value_parser = ["low", "medium", "high", "ultra"])]
-    pub quality: Option<String>,
+    #[command(flatten)]
+    pub start: StartOptions,
     /// Size of the picture in pixels, each side from 1 to 8192
     #[arg(long, value_name = "WxH", default_value = "480x270", value_parser = size)]
     pub size: (u32, u32),
     /// Frames rendered; the last one is kept
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u32).range(1..=100_000))]
     pub frames: u32,
-    /// Metres and degrees; y is the altitude, yaw 0 looks along −Z and turns right, fov is vertical (60)
-    #[arg(long, value_name = "X,Y,Z,YAW,PITCH[,FOV]", allow_hyphen_values = true)]
-    pub camera: Option<CameraPose>,
     /// Added to the camera before every frame but the first, along the world's axes
     #[arg(long = "move", value_name = "DX,DY,DZ,DYAW,DPITCH", allow_hyphen_values = true,
           value_parser = |text: &str| exactly::<5>(text, "dx,dy,dz,dyaw,dpitch"))]
     pub travel: Option<[f32; 5]>,
-    /// Degrees; the azimuth is counted as yaw is
-    #[arg(long, value_name = "ELEVATION,AZIMUTH", allow_hyphen_values = true)]
-    pub sun: Option<SunPose>,
     /// Added to the sun before every frame but the first
     #[arg(long, value_name = "DELEV,DAZIM", allow_hyphen_values = true,
           value_parser = |text: &str| exactly::<2>(text, "delev,dazim"))]
@@ -54,12 +44,6 @@ pub struct Options {
     /// Added to the cloud clock before every frame but the first (s)
     #[arg(long, value_name = "SECONDS", allow_hyphen_values = true, default_value_t = 0.0, value_parser = finite)]
     pub dt: f64,
-    /// Any setting by its path (see --list); may be repeated
-    #[arg(long = "set", value_name = "PATH=VALUE")]
-    pub sets: Vec<String>,
-    /// No atmosphere: black behind the clouds
-    #[arg(long)]
-    pub no_sky: bool,
     /// Exposure of the camera (EV100); by default it follows the sun's elevation
     #[arg(long, value_name = "EV100", allow_hyphen_values = true, value_parser = ev100)]
     pub ev: Option<f32>,
@@ -95,7 +79,9 @@ fn ev100(text: &str) -> Result<f32, String> {
 
 /// What is to be rendered, with every default filled in and every value checked.
 pub struct Plan {
-    pub scene: Option<Scene>,
+    pub scene: Scene,
+    /// The scene's name, where one was given.
+    named: Option<&'static str>,
     pub preset: String,
     pub settings: CloudSettings,
     pub size: (u32, u32),
@@ -116,76 +102,29 @@ pub struct Plan {
 impl Options {
     /// Fills in the defaults and checks the rest.
     pub fn plan(&self) -> Result<Plan> {
-        let scene = self.scene.as_deref().map(find_scene).transpose()?;
-        let base = scene.unwrap_or(PLAIN);
-        let preset_name = self.preset.as_deref().unwrap_or(base.preset);
-        let preset = find_preset(preset_name)?;
-        // A scene has its sun; where there is none, the preset's advice is taken.
-        let advised = preset.sun_elevation.filter(|_| scene.is_none());
-        let elevation = advised.unwrap_or(base.sun.elevation);
-        let sun = self.sun.unwrap_or(SunPose { elevation, ..base.sun });
+        // Runs must repeat, so real time does not move the clouds.
+        let clock = CloudClock { seconds: self.time.unwrap_or(0.0), speed: 0.0 };
+        let Start { scene, named, preset, settings, camera, sun, sky } = self.start.start(None, clock)?;
         Ok(Plan {
-            settings: self.settings(preset)?,
-            preset: preset_name.to_owned(),
+            scene,
+            named,
+            settings,
+            preset,
+            sky,
+            camera,
+            sun,
             size: self.size,
             frames: self.frames,
-            sky: !self.no_sky,
             msaa: if self.msaa == "4" { 4 } else { 1 },
-            ev100: self.ev.unwrap_or(sun.ev100() + base.ev_offset),
+            ev100: self.ev.unwrap_or(sun.ev100() + scene.ev_offset),
             out: self.out.clone(),
             cloud: self.cloud.clone(),
             timings: self.timings.clone(),
-            camera: self.camera.unwrap_or(base.camera),
             travel: self.travel.unwrap_or_default(),
-            sun,
             sun_move: self.sun_move.unwrap_or_default(),
             dt: self.dt,
-            scene,
         })
     }
-
-    fn settings(&self, preset: CloudPreset) -> Result<CloudSettings> {
-        let mut settings = CloudSettings {
-            model: preset.model,
-            lighting: preset.lighting,
-            textures: preset.textures,
-            ..Default::default()
-        };
-        if let Some(quality) = self.quality.as_deref().and_then(CloudQuality::named) {
-            settings.quality = quality;
-        }
-        // Runs must repeat, so real time does not move the clouds.
-        settings.clock.speed = 0.0;
-        settings.clock.seconds = self.time.unwrap_or(0.0);
-        settings.validate().context("--time")?;
-        for text in &self.sets {
-            let (path, value) = text
-                .split_once('=')
-                .ok_or_else(|| anyhow!("--set {text}: expected PATH=VALUE, such as model.coverage=0.2"))?;
-            settings.set(path.trim(), value).with_context(|| format!("--set {text}"))?;
-        }
-        settings.validate().context("--set")?;
-        Ok(settings)
-    }
-}
-
-fn find_scene(name: &str) -> Result<Scene> {
-    Scene::named(name).ok_or_else(|| {
-        let known = SCENES.map(|scene| scene.name).join(", ");
-        anyhow!("--scene {name:?}: no such scene; there are {known}")
-    })
-}
-
-fn find_preset(name: &str) -> Result<CloudPreset> {
-    if let Some(preset) = CloudPreset::named(name) {
-        return Ok(preset);
-    }
-    let path = Path::new(name);
-    if path.extension().is_some_and(|extension| extension == "ron") || path.is_file() {
-        return CloudPreset::read(path).context("--preset");
-    }
-    let known = CloudPreset::names().collect::<Vec<_>>().join(", ");
-    bail!("--preset {name:?}: no such preset; there are {known}, or give a .ron file")
 }
 
 impl Plan {
@@ -238,7 +177,7 @@ impl Plan {
             sky: self.sky,
             msaa: self.msaa,
             ev100: self.ev100,
-            scene: self.scene.map(|scene| scene.name),
+            scene: self.named,
             preset: &self.preset,
         }
     }

@@ -2,7 +2,6 @@
 
 use std::time::{Duration, Instant};
 
-use bevy_cumulus::{CloudBuffer, CloudStatus, prelude::*, textures::CloudTextureStatus};
 use anyhow::{Result, anyhow, bail, ensure};
 use bevy::{
     camera::RenderTarget,
@@ -23,6 +22,7 @@ use bevy::{
     window::ExitCondition,
     winit::WinitPlugin,
 };
+use bevy_cumulus::{CloudBuffer, CloudStatus, prelude::*, textures::CloudTextureStatus};
 use image::{RgbImage, Rgba32FImage};
 
 use crate::{
@@ -114,7 +114,7 @@ impl Studio {
         let (width, height) = plan.size;
         let limit = world.resource::<RenderDevice>().limits().max_texture_dimension_2d;
         ensure!(width.max(height) <= limit, "--size {width}x{height}: this device makes at most {limit} pixels a side");
-        let hills = plan.scene.is_some_and(|scene| scene.hills);
+        let hills = plan.scene.hills;
         common::spawn_land(world, hills);
         let sun = common::spawn_sky(world, plan.sun(0), plan.sky, hills);
 

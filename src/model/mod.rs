@@ -8,7 +8,7 @@ mod probe;
 mod space;
 mod uniform;
 
-use bevy::{asset::embedded_asset, prelude::*, shader::load_shader_library};
+use bevy::{prelude::*, shader::load_shader_library};
 
 pub(crate) use bindings::ModelBindings;
 pub(crate) use space::TangentFrame;
@@ -25,8 +25,9 @@ const MODEL_PATH: &str = "embedded://bevy_cumulus/model/model.wesl";
 #[derive(Resource, Clone, Debug)]
 pub struct ModelShader(pub String);
 
-#[derive(Resource, Default)]
-struct ModelShaderHandle(Option<Handle<Shader>>);
+/// The model's module: one asset for as long as the app lives, so that whatever it holds, pipelines follow.
+#[derive(Resource)]
+struct ModelModule(Handle<Shader>);
 
 pub(crate) struct CloudModelPlugin;
 
@@ -34,28 +35,17 @@ impl Plugin for CloudModelPlugin {
     fn build(&self, app: &mut App) {
         load_shader_library!(app, "medium.wesl");
         load_shader_library!(app, "planet.wesl");
-        if app.world().contains_resource::<ModelShader>() {
-            // The built-in module must not be registered after the user's, or it would take its place back.
-            embedded_asset!(app, "model.wesl");
-        } else {
-            load_shader_library!(app, "model.wesl");
-        }
-        app.init_resource::<ModelShaderHandle>().add_systems(
-            PreUpdate,
-            register_model_shader.run_if(resource_exists_and_changed::<ModelShader>),
-        );
+        // Not loaded as an embedded asset: that would come later, and could take the place of a user's module.
+        let built_in = Shader::from_wesl(include_str!("model.wesl"), MODEL_PATH);
+        let module = app.world_mut().resource_mut::<Assets<Shader>>().add(built_in);
+        app.insert_resource(ModelModule(module))
+            .add_systems(PreUpdate, replace_model.run_if(resource_exists_and_changed::<ModelShader>));
     }
 }
 
-fn register_model_shader(
-    source: Res<ModelShader>,
-    mut held: ResMut<ModelShaderHandle>,
-    mut shaders: ResMut<Assets<Shader>>,
-) {
+fn replace_model(source: Res<ModelShader>, module: Res<ModelModule>, mut shaders: ResMut<Assets<Shader>>) {
     let shader = Shader::from_wesl(source.0.clone(), MODEL_PATH);
-    // The same asset again: the pipelines that use it are then built anew.
-    let replaced = held.0.as_ref().is_some_and(|handle| shaders.insert(handle.id(), shader.clone()).is_ok());
-    if !replaced {
-        held.0 = Some(shaders.add(shader));
+    if shaders.insert(module.0.id(), shader).is_err() {
+        error!("clouds: the model's shader asset is gone; the model was not replaced");
     }
 }

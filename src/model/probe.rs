@@ -5,7 +5,7 @@ use bevy::{
     prelude::*,
     render::{
         RenderApp,
-        render_resource::{BindGroup, BindGroupLayoutDescriptor, PipelineCache, TextureView, UniformBuffer},
+        render_resource::{BindGroup, BindGroupLayoutDescriptor, PipelineCache, UniformBuffer},
         renderer::{RenderDevice, RenderQueue},
     },
 };
@@ -31,7 +31,7 @@ impl ModelShader {
         let clock = app.world().get_resource::<CloudClock>().ok_or("no CloudClock")?;
         let world = app.get_sub_app(RenderApp).ok_or("no render app")?.world();
         let views = world.get_resource::<CloudTextureViews>().ok_or("no textures on this device")?;
-        let sizes = texel_sizes(views).ok_or("the textures are not there yet")?;
+        let sizes = TexelSizes::of(views).ok_or("the textures are not there yet")?;
         let centre = DVec3::new(0.0, -PLANET_RADIUS, 0.0);
         let frame = TangentFrame::below(camera + model.world_offset, centre, PLANET_RADIUS)
             .ok_or("the camera is at the planet's centre, or not a number")?;
@@ -44,14 +44,4 @@ impl ModelShader {
             .ok_or("the textures are not there yet")?;
         Ok((bindings.layout.clone(), group))
     }
-}
-
-fn texel_sizes(views: &CloudTextureViews) -> Option<TexelSizes> {
-    let width = |view: &Option<TextureView>| Some(view.as_ref()?.texture().width());
-    Some(TexelSizes {
-        billow: width(&views.billow)?,
-        wisp: width(&views.wisp)?,
-        coverage: width(&views.coverage)?,
-        type_map: width(&views.type_map)?,
-    })
 }

@@ -25,12 +25,8 @@ impl TangentFrame {
         let across = DVec2::new(up.x, up.z);
         // Azimuthal equidistant around the pole: true lengths along any line through the world's origin.
         let map = across.normalize_or_zero() * across.length().atan2(up.y) * radius;
-        let frame = Self {
-            radius,
-            altitude: distance - radius,
-            map,
-            local_from_world: DQuat::from_rotation_arc(up, DVec3::Y),
-        };
+        let frame =
+            Self { radius, altitude: distance - radius, map, local_from_world: DQuat::from_rotation_arc(up, DVec3::Y) };
         (distance.is_finite() && map.is_finite()).then_some(frame)
     }
 }

@@ -1,9 +1,16 @@
 //! [`CloudModel`] as the shader reads it.
 
-use bevy::{math::DVec2, prelude::*, render::render_resource::ShaderType};
+use bevy::{
+    prelude::*,
+    render::render_resource::{ShaderType, TextureView},
+};
+use glam::DVec2;
 
 use super::TangentFrame;
-use crate::settings::{CloudModel, Erosion};
+use crate::{
+    settings::{CloudModel, Erosion},
+    textures::CloudTextureViews,
+};
 
 /// The group map is this many times larger than the coverage map: irrational, so the pair never repeats.
 const GROUP_SCALE: f64 = 2.618_033_988_75;
@@ -15,6 +22,19 @@ pub(crate) struct TexelSizes {
     pub wisp: u32,
     pub coverage: u32,
     pub type_map: u32,
+}
+
+impl TexelSizes {
+    /// Sizes of the bound textures; `None` while one is missing.
+    pub fn of(views: &CloudTextureViews) -> Option<Self> {
+        let width = |view: &Option<TextureView>| Some(view.as_ref()?.texture().width());
+        Some(Self {
+            billow: width(&views.billow)?,
+            wisp: width(&views.wisp)?,
+            coverage: width(&views.coverage)?,
+            type_map: width(&views.type_map)?,
+        })
+    }
 }
 
 /// `Model` of `model.wesl`, field for field.

@@ -69,15 +69,9 @@ mod tests {
             for dt in [1.0, 90.0, 700.0] {
                 let pieces = 200_000;
                 let piece = dt / f64::from(pieces);
-                let sum: f64 = (0..pieces)
-                    .map(|i| transmittance(sigma_t * piece * (f64::from(i) + 0.5)) * piece)
-                    .sum();
+                let sum: f64 = (0..pieces).map(|i| transmittance(sigma_t * piece * (f64::from(i) + 0.5)) * piece).sum();
                 let step = step_energy_conserving(DVec3::new(1.0, 2.0, 0.0), sigma_t, dt);
-                assert!(
-                    (step.x / sum - 1.0).abs() < 1e-6,
-                    "sigma_t {sigma_t} dt {dt}: {} {sum}",
-                    step.x
-                );
+                assert!((step.x / sum - 1.0).abs() < 1e-6, "sigma_t {sigma_t} dt {dt}: {} {sum}", step.x);
                 assert!((step.y - 2.0 * step.x).abs() < 1e-9 && step.z == 0.0);
                 assert!(step.x <= step_naive(DVec3::ONE, dt).x);
             }
@@ -96,12 +90,7 @@ mod tests {
     #[test]
     fn octaves_add_up() {
         let phase = Phase::HenyeyGreenstein { g: 0.8 };
-        let octaves = |count| Octaves {
-            count,
-            attenuation: 0.5,
-            contribution: 0.4,
-            eccentricity: 0.3,
-        };
+        let octaves = |count| Octaves { count, attenuation: 0.5, contribution: 0.4, eccentricity: 0.3 };
         let sum = |count| octave_sum(&phase, 0.2, 100.0, 3.0, octaves(count));
         assert_eq!(sum(0), 0.0);
         let single = 100.0 * phase.value(0.2, 1.0) * (-3.0_f64).exp();

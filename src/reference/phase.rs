@@ -24,8 +24,7 @@ pub fn hg(g: f64, cos_theta: f64) -> f64 {
 ///
 /// `alpha` = 0 is Henyey–Greenstein, 1 is Cornette–Shanks, and 1 with `g` = 0 is Rayleigh.
 pub fn draine(g: f64, alpha: f64, cos_theta: f64) -> f64 {
-    hg(g, cos_theta) * (1.0 + alpha * cos_theta * cos_theta)
-        / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0)
+    hg(g, cos_theta) * (1.0 + alpha * cos_theta * cos_theta) / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0)
 }
 
 /// `(1 − mix)·HG(g) + mix·HG(g_back)`, with `mix` in 0..=1.
@@ -110,17 +109,11 @@ impl Phase {
     pub fn from_settings(lighting: &CloudLighting) -> Result<Self, SettingsError> {
         Ok(match lighting.phase {
             PhaseFunction::Isotropic => Self::Isotropic,
-            PhaseFunction::HenyeyGreenstein => Self::HenyeyGreenstein {
-                g: lighting.g.into(),
-            },
-            PhaseFunction::TwoLobe => Self::TwoLobe {
-                g: lighting.g.into(),
-                g_back: lighting.g_back.into(),
-                mix: lighting.lobe_mix.into(),
-            },
-            PhaseFunction::HgDraine => {
-                Self::HgDraine(HgDraine::from_diameter(lighting.droplet_diameter.into())?)
+            PhaseFunction::HenyeyGreenstein => Self::HenyeyGreenstein { g: lighting.g.into() },
+            PhaseFunction::TwoLobe => {
+                Self::TwoLobe { g: lighting.g.into(), g_back: lighting.g_back.into(), mix: lighting.lobe_mix.into() }
             }
+            PhaseFunction::HgDraine => Self::HgDraine(HgDraine::from_diameter(lighting.droplet_diameter.into())?),
         })
     }
 
@@ -132,18 +125,9 @@ impl Phase {
             Self::Isotropic => isotropic(),
             Self::HenyeyGreenstein { g } => hg(c * g, cos_theta),
             Self::TwoLobe { g, g_back, mix } => two_lobe(c * g, c * g_back, mix, cos_theta),
-            Self::HgDraine(HgDraine {
-                g_hg,
-                g_d,
-                alpha,
-                w,
-            }) => HgDraine {
-                g_hg: c * g_hg,
-                g_d: c * g_d,
-                alpha: c * alpha,
-                w,
+            Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => {
+                HgDraine { g_hg: c * g_hg, g_d: c * g_d, alpha: c * alpha, w }.value(cos_theta)
             }
-            .value(cos_theta),
         }
     }
 
@@ -155,8 +139,8 @@ impl Phase {
             Self::TwoLobe { g, g_back, mix } => (1.0 - mix) * g + mix * g_back,
             Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => {
                 // Draine 2003, equation 6.
-                let draine = g_d * (1.0 + alpha * (3.0 + 2.0 * g_d * g_d) / 5.0)
-                    / (1.0 + alpha * (1.0 + 2.0 * g_d * g_d) / 3.0);
+                let draine =
+                    g_d * (1.0 + alpha * (3.0 + 2.0 * g_d * g_d) / 5.0) / (1.0 + alpha * (1.0 + 2.0 * g_d * g_d) / 3.0);
                 (1.0 - w) * g_hg + w * draine
             }
         }
@@ -168,12 +152,7 @@ impl Phase {
             Self::Isotropic => (0, [0.0; 4]),
             Self::HenyeyGreenstein { g } => (1, [g, 0.0, 0.0, 0.0]),
             Self::TwoLobe { g, g_back, mix } => (2, [g, g_back, mix, 0.0]),
-            Self::HgDraine(HgDraine {
-                g_hg,
-                g_d,
-                alpha,
-                w,
-            }) => (3, [g_hg, g_d, alpha, w]),
+            Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => (3, [g_hg, g_d, alpha, w]),
         };
         (kind, params.map(|p| p as f32))
     }

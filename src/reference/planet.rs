@@ -39,14 +39,7 @@ pub fn shell_roots(h0: f64, mu: f64, shell: f64, radius: f64) -> Option<Interval
 ///
 /// The planet's surface (altitude 0) ends the ray. A camera below it (in a valley under sea level) sees out through
 /// it, but sees nothing below the horizontal. `bottom` and `top` are altitudes; the rest is as in [`shell_roots`].
-pub fn shell_intervals(
-    h0: f64,
-    mu: f64,
-    bottom: f64,
-    top: f64,
-    radius: f64,
-    t_max: f64,
-) -> Vec<Interval> {
+pub fn shell_intervals(h0: f64, mu: f64, bottom: f64, top: f64, radius: f64, t_max: f64) -> Vec<Interval> {
     let Some(outer) = shell_roots(h0, mu, top, radius) else {
         return Vec::new();
     };
@@ -64,11 +57,7 @@ pub fn shell_intervals(
         None => vec![outer],
         Some(inner) => vec![[outer[0], inner[0]], [inner[1], outer[1]]],
     };
-    parts
-        .into_iter()
-        .map(|[a, b]| [a.max(0.0), b.min(end)])
-        .filter(|[a, b]| b > a)
-        .collect()
+    parts.into_iter().map(|[a, b]| [a.max(0.0), b.min(end)]).filter(|[a, b]| b > a).collect()
 }
 
 /// Horizontal map coordinates of `p` relative to the point below the camera (m): arc length along the surface, in the
@@ -98,11 +87,7 @@ mod tests {
                 2 => rng.random_range(top..30_000.0),
                 _ => rng.random_range(30_000.0..5e6),
             };
-            let mu: f64 = if rng.random_bool(0.5) {
-                rng.random_range(-0.2..0.1)
-            } else {
-                rng.random_range(-1.0..1.0)
-            };
+            let mu: f64 = if rng.random_bool(0.5) { rng.random_range(-0.2..0.1) } else { rng.random_range(-1.0..1.0) };
             let intervals = shell_intervals(h0, mu, bottom, top, PLANET_RADIUS, 3e6);
             assert!(intervals.len() <= 2);
             let closest = (PLANET_RADIUS + h0) * (1.0 - mu * mu).sqrt() - PLANET_RADIUS;
@@ -117,13 +102,9 @@ mod tests {
                 let h = altitude(DVec3::Y * h0 + direction * t, PLANET_RADIUS);
                 blocked |= h0 >= 0.0 && h < -1.0;
                 let expected = !blocked && (bottom..top).contains(&h);
-                let near_an_edge =
-                    (h - bottom).abs() < 0.01 || (h - top).abs() < 0.01 || h.abs() < 1.0;
+                let near_an_edge = (h - bottom).abs() < 0.01 || (h - top).abs() < 0.01 || h.abs() < 1.0;
                 let found = intervals.iter().any(|&[a, b]| (a..b).contains(&t));
-                assert!(
-                    found == expected || near_an_edge,
-                    "h0 {h0} mu {mu} shells {bottom}..{top} t {t} h {h}"
-                );
+                assert!(found == expected || near_an_edge, "h0 {h0} mu {mu} shells {bottom}..{top} t {t} h {h}");
                 inside += u32::from(found);
             }
         }
@@ -132,14 +113,8 @@ mod tests {
 
     #[test]
     fn map_coordinates_are_arc_lengths() {
-        let quarter = map_position(
-            DVec3::new(0.0, -PLANET_RADIUS, PLANET_RADIUS),
-            PLANET_RADIUS,
-        );
-        assert!(quarter.abs_diff_eq(
-            DVec2::new(0.0, PLANET_RADIUS * std::f64::consts::FRAC_PI_2),
-            1e-6
-        ));
+        let quarter = map_position(DVec3::new(0.0, -PLANET_RADIUS, PLANET_RADIUS), PLANET_RADIUS);
+        assert!(quarter.abs_diff_eq(DVec2::new(0.0, PLANET_RADIUS * std::f64::consts::FRAC_PI_2), 1e-6));
         assert_eq!(map_position(DVec3::Y * 800.0, PLANET_RADIUS), DVec2::ZERO);
     }
 }

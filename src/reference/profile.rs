@@ -34,11 +34,7 @@ pub struct HeightRange {
 impl From<[f32; 3]> for HeightRange {
     /// From (a, b, c), as in [`STRATUS_PROFILE`](crate::textures::STRATUS_PROFILE).
     fn from([a, b, c]: [f32; 3]) -> Self {
-        Self {
-            full: a.into(),
-            thins: b.into(),
-            top: c.into(),
-        }
+        Self { full: a.into(), thins: b.into(), top: c.into() }
     }
 }
 
@@ -86,38 +82,21 @@ mod tests {
     use super::*;
     use crate::textures::{CUMULUS_PROFILE, STRATUS_PROFILE, vertical_profile};
 
-    const CUMULUS: HeightRange = HeightRange {
-        full: 0.1,
-        thins: 0.4,
-        top: 1.0,
-    };
-    const STRATUS: HeightRange = HeightRange {
-        full: 0.05,
-        thins: 0.1,
-        top: 0.2,
-    };
+    const CUMULUS: HeightRange = HeightRange { full: 0.1, thins: 0.4, top: 1.0 };
+    const STRATUS: HeightRange = HeightRange { full: 0.05, thins: 0.1, top: 0.2 };
 
     #[test]
     fn remap_is_linear_between_the_ends() {
         assert_eq!(remap(3.0, [2.0, 4.0], [10.0, 20.0]), 15.0);
         assert_eq!(remap(2.0, [2.0, 4.0], [1.0, 0.0]), 1.0);
         assert_eq!(remap(5.0, [2.0, 4.0], [1.0, 0.0]), -0.5);
-        assert_eq!(
-            [
-                remap(0.9, [1.0; 2], [0.0, 1.0]),
-                remap(1.0, [1.0; 2], [0.0, 1.0])
-            ],
-            [0.0, 1.0]
-        );
+        assert_eq!([remap(0.9, [1.0; 2], [0.0, 1.0]), remap(1.0, [1.0; 2], [0.0, 1.0])], [0.0, 1.0]);
     }
 
     #[test]
     fn the_profile_rises_holds_and_falls() {
         let at = |h| CUMULUS.vertical_profile(h);
-        assert_eq!(
-            [at(-0.1), at(0.0), at(0.1), at(0.4), at(1.0), at(1.2)],
-            [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]
-        );
+        assert_eq!([at(-0.1), at(0.0), at(0.1), at(0.4), at(1.0), at(1.2)], [0.0, 0.0, 1.0, 1.0, 0.0, 0.0]);
         assert!((at(0.05) - 0.5).abs() < 1e-12 && (at(0.7) - 0.5).abs() < 1e-12);
     }
 
@@ -136,13 +115,9 @@ mod tests {
         for t in 0..=20_u8 {
             for h in 0..=100_u8 {
                 let (t, h) = (f32::from(t) / 20.0, f32::from(h) / 100.0);
-                let range =
-                    HeightRange::of_type(STRATUS_PROFILE.into(), CUMULUS_PROFILE.into(), t.into());
+                let range = HeightRange::of_type(STRATUS_PROFILE.into(), CUMULUS_PROFILE.into(), t.into());
                 let (baked, exact) = (vertical_profile(t, h), range.vertical_profile(h.into()));
-                assert!(
-                    (f64::from(baked) - exact).abs() < 1e-5,
-                    "type {t} height {h}: {baked}, not {exact}"
-                );
+                assert!((f64::from(baked) - exact).abs() < 1e-5, "type {t} height {h}: {baked}, not {exact}");
             }
         }
     }
@@ -154,10 +129,7 @@ mod tests {
                 for j in 0..=50 {
                     let (d, n) = (f64::from(i) / 50.0, f64::from(j) / 50.0);
                     let left = erode(d, n, erosion);
-                    assert!(
-                        (0.0..=d + 1e-12).contains(&left),
-                        "{erosion:?} d {d} n {n}: {left}"
-                    );
+                    assert!((0.0..=d + 1e-12).contains(&left), "{erosion:?} d {d} n {n}: {left}");
                 }
             }
             assert_eq!(erode(0.0, 1.0, erosion), 0.0);

@@ -4,8 +4,7 @@ use bevy::{
     pbr::{
         GpuAtmosphereSettings,
         resources::{
-            AtmosphereSampler, AtmosphereTextures, AtmosphereTransforms,
-            AtmosphereTransformsOffset, GpuAtmosphere,
+            AtmosphereSampler, AtmosphereTextures, AtmosphereTransforms, AtmosphereTransformsOffset, GpuAtmosphere,
         },
     },
     prelude::*,
@@ -128,7 +127,15 @@ pub(crate) fn prepare_bind_groups(
             }
         };
         let groups = view_bind_groups(
-            &item, sky_light, &air_resources, &textures, &images, &model, &mut pipelines, &cache, &device,
+            &item,
+            sky_light,
+            &air_resources,
+            &textures,
+            &images,
+            &model,
+            &mut pipelines,
+            &cache,
+            &device,
         );
         match groups {
             Some((groups, view_ready)) => {
@@ -144,7 +151,6 @@ pub(crate) fn prepare_bind_groups(
     status.set_views_ready(ready);
 }
 
-#[expect(clippy::too_many_arguments, reason = "one call, of what the system was given")]
 fn view_bind_groups(
     item: &BoundViewItem,
     sky_light: &Buffer,
@@ -164,8 +170,7 @@ fn view_bind_groups(
     });
     let multisampled = *item.msaa != Msaa::Off;
     let ms = usize::from(multisampled);
-    let variant =
-        Variant { atmosphere: air.is_some(), multisampled, target: item.view.target_format };
+    let variant = Variant { atmosphere: air.is_some(), multisampled, target: item.view.target_format };
     let ids = pipelines.get(cache, model, variant);
     let empty = device.create_bind_group("cloud_empty", &layout(&pipelines.empty), &[]);
     let (air, air_offsets) = air.unwrap_or_else(|| (empty.clone(), Vec::new()));
@@ -188,12 +193,7 @@ fn view_bind_groups(
             world_from_local.clone(),
         )),
     );
-    let resolved = BindGroupEntries::sequential((
-        frame.clone(),
-        history.sum_after(),
-        &history.distances,
-        depth,
-    ));
+    let resolved = BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth));
     let publish = item.cloud.buffer.and_then(|id| images.get(id)).map(|image| {
         let entries = BindGroupEntries::sequential((
             frame.clone(),
@@ -211,11 +211,7 @@ fn view_bind_groups(
             group(
                 "cloud_sky",
                 &pipelines.sky,
-                &BindGroupEntries::sequential((
-                    frame.clone(),
-                    sky_light.as_entire_binding(),
-                    world_from_local,
-                )),
+                &BindGroupEntries::sequential((frame.clone(), sky_light.as_entire_binding(), world_from_local)),
             ),
         ),
         march: (ids.march, march),
@@ -224,12 +220,7 @@ fn view_bind_groups(
             group(
                 "cloud_accumulate",
                 &pipelines.accumulate,
-                &BindGroupEntries::sequential((
-                    frame,
-                    &history.frames_view,
-                    history.sum_before(),
-                    history.sum_after(),
-                )),
+                &BindGroupEntries::sequential((frame, &history.frames_view, history.sum_before(), history.sum_after())),
             ),
         ),
         composite: (ids.composite, group("cloud_composite", &pipelines.composite[ms], &resolved)),

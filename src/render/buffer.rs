@@ -49,15 +49,9 @@ fn blank(width: u32, height: u32, format: TextureFormat, write: TextureUsages) -
     let size = Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 };
     let texel = [0; 16];
     let bytes = if format == TextureFormat::Rgba32Float { 16 } else { 8 };
-    let mut image = Image::new_fill(
-        size,
-        TextureDimension::D2,
-        &texel[..bytes],
-        format,
-        RenderAssetUsages::RENDER_WORLD,
-    );
-    image.texture_descriptor.usage =
-        write | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
+    let mut image =
+        Image::new_fill(size, TextureDimension::D2, &texel[..bytes], format, RenderAssetUsages::RENDER_WORLD);
+    image.texture_descriptor.usage = write | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC;
     image
 }
 

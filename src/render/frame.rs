@@ -1,9 +1,6 @@
 //! `CloudFrame` of `frame.wesl`: everything one view's passes share.
 
-use bevy::{
-    prelude::*,
-    render::render_resource::ShaderType,
-};
+use bevy::{prelude::*, render::render_resource::ShaderType};
 
 use super::history::FrameInWindow;
 use crate::{
@@ -134,12 +131,7 @@ impl FrameUniform {
                 },
                 quality.offsets.into(),
             ),
-            layers: UVec4::new(
-                window.layer(),
-                window.leaving_layer(),
-                window.layers(),
-                window.held_before,
-            ),
+            layers: UVec4::new(window.layer(), window.leaving_layer(), window.layers(), window.held_before),
         }
     }
 }

@@ -3,10 +3,7 @@
 use bevy::{
     math::Vec4Swizzles,
     prelude::*,
-    render::{
-        render_resource::*,
-        renderer::RenderDevice,
-    },
+    render::{render_resource::*, renderer::RenderDevice},
 };
 
 use super::frame::Sun;
@@ -91,8 +88,7 @@ pub(crate) struct CloudHistory {
 impl CloudHistory {
     /// A new, empty history.
     pub fn new(device: &RenderDevice, key: HistoryKey, pose: Pose) -> Self {
-        let frame =
-            FrameInWindow { index: 0, window: key.window, held_before: 0, exposure: pose.exposure };
+        let frame = FrameInWindow { index: 0, window: key.window, held_before: 0, exposure: pose.exposure };
         let texture = |label, format, layers| {
             device.create_texture(&TextureDescriptor {
                 label: Some(label),
@@ -101,9 +97,7 @@ impl CloudHistory {
                 sample_count: 1,
                 dimension: TextureDimension::D2,
                 format,
-                usage: TextureUsages::STORAGE_BINDING
-                    | TextureUsages::TEXTURE_BINDING
-                    | TextureUsages::COPY_SRC,
+                usage: TextureUsages::STORAGE_BINDING | TextureUsages::TEXTURE_BINDING | TextureUsages::COPY_SRC,
                 view_formats: &[],
             })
         };
@@ -119,10 +113,8 @@ impl CloudHistory {
             })
         };
         Self {
-            frames_view: frames.create_view(&TextureViewDescriptor {
-                dimension: Some(TextureViewDimension::D2Array),
-                ..default()
-            }),
+            frames_view: frames
+                .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() }),
             layer_views: (0..frame.layers()).map(layer).collect(),
             sums: [0, 1].map(|_| whole(texture("cloud_sum", TextureFormat::Rgba32Float, 1))),
             distances: whole(texture("cloud_distances", TextureFormat::Rg32Float, 1)),
@@ -139,9 +131,7 @@ impl CloudHistory {
             *self = Self::new(device, key, pose);
             return;
         }
-        let keep = drawn
-            && key == self.key
-            && stands_still(&self.pose, &pose, key.window, self.frame.exposure);
+        let keep = drawn && key == self.key && stands_still(&self.pose, &pose, key.window, self.frame.exposure);
         self.frame = if keep {
             FrameInWindow {
                 index: self.frame.index.wrapping_add(1),
@@ -177,10 +167,7 @@ impl CloudHistory {
     }
     /// The newest frame, to be copied.
     pub fn newest_copy(&self) -> TexelCopyTextureInfo<'_> {
-        TexelCopyTextureInfo {
-            origin: Origin3d { x: 0, y: 0, z: self.frame.layer() },
-            ..self.frames.as_image_copy()
-        }
+        TexelCopyTextureInfo { origin: Origin3d { x: 0, y: 0, z: self.frame.layer() }, ..self.frames.as_image_copy() }
     }
 }
 
@@ -192,15 +179,12 @@ fn stands_still(before: &Pose, now: &Pose, window: u32, stored_exposure: f32) ->
         && before.position.distance(now.position) < 1e-3
         && before.rotation.abs_diff_eq(now.rotation, 1e-5);
     let drift = now.wind * (now.seconds - before.seconds).abs() as f32 * frames;
-    let turned = before.sun.direction.angle_between(now.sun.direction) * frames;
+    // Sine of the angle: acos has no precision where the two are alike.
+    let turned = before.sun.direction.cross(now.sun.direction).length() * frames;
     let brightness = before.sun.illuminance.length().max(1e-6);
     let dimmed = (before.sun.illuminance - now.sun.illuminance).length() / brightness * frames;
     let exposed = now.exposure / stored_exposure;
-    camera
-        && drift <= now.drift_limit
-        && !(turned > 0.01)
-        && dimmed < 0.05
-        && (0.25..4.0).contains(&exposed)
+    camera && drift <= now.drift_limit && turned <= 0.01 && dimmed < 0.05 && (0.25..4.0).contains(&exposed)
 }
 
 #[cfg(test)]

@@ -23,8 +23,8 @@ use bevy::{
 use crate::model::ModelBindings;
 
 pub use buffer::{CloudBuffer, CloudFrame};
-pub(crate) use status::StatusFlags;
 pub use status::CloudStatus;
+pub(crate) use status::StatusFlags;
 
 /// Shaders, and the systems of the render world.
 pub(crate) struct CloudRenderPlugin;
@@ -58,8 +58,13 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
             (
                 view::request_depth
                     .in_set(RenderSystems::Prepare)
-                    .before(prepare_core_3d_depth_textures),
-                (view::prepare_views, buffer::refuse_unfit_images).in_set(RenderSystems::PrepareResources),
+                    .before(prepare_core_3d_depth_textures)
+                    // Others set flags of the same field, in any order; the system above alone reads it.
+                    .ambiguous_with_all(),
+                (buffer::refuse_unfit_images, view::prepare_views)
+                    .chain()
+                    .after(crate::textures::TextureSwaps)
+                    .in_set(RenderSystems::PrepareResources),
                 bind_groups::prepare_bind_groups.in_set(RenderSystems::PrepareBindGroups),
             ),
         )

@@ -29,9 +29,8 @@ fn dispatch(
     let Some(pipeline) = pipeline else { return };
     let diagnostics = ctx.diagnostic_recorder();
     let diagnostics = diagnostics.as_deref();
-    let mut pass = ctx
-        .command_encoder()
-        .begin_compute_pass(&ComputePassDescriptor { label: Some(label), timestamp_writes: None });
+    let mut pass =
+        ctx.command_encoder().begin_compute_pass(&ComputePassDescriptor { label: Some(label), timestamp_writes: None });
     let span = diagnostics.pass_span(&mut pass, label);
     pass.set_pipeline(pipeline);
     for (index, (group, offsets)) in (0..).zip(groups) {

@@ -87,12 +87,7 @@ impl FromWorld for CloudPipelines {
                 "cloud_composite",
                 &BindGroupLayoutEntries::sequential(
                     ShaderStages::FRAGMENT,
-                    (
-                        frame(),
-                        texture_2d(unfiltered),
-                        texture_2d(unfiltered),
-                        depth_layout(multisampled),
-                    ),
+                    (frame(), texture_2d(unfiltered), texture_2d(unfiltered), depth_layout(multisampled)),
                 ),
             )
         };
@@ -141,12 +136,7 @@ impl FromWorld for CloudPipelines {
                 "cloud_accumulate",
                 &BindGroupLayoutEntries::sequential(
                     compute,
-                    (
-                        frame(),
-                        texture_2d_array(unfiltered),
-                        texture_2d(unfiltered),
-                        write(TextureFormat::Rgba32Float),
-                    ),
+                    (frame(), texture_2d_array(unfiltered), texture_2d(unfiltered), write(TextureFormat::Rgba32Float)),
                 ),
             ),
             composite: [composite(false), composite(true)],
@@ -233,9 +223,7 @@ impl CloudPipelines {
 impl Pipelines {
     /// Whether all are compiled.
     pub fn ready(self, cache: &PipelineCache) -> bool {
-        [self.sky, self.march, self.accumulate, self.publish]
-            .iter()
-            .all(|id| cache.get_compute_pipeline(*id).is_some())
+        [self.sky, self.march, self.accumulate, self.publish].iter().all(|id| cache.get_compute_pipeline(*id).is_some())
             && cache.get_render_pipeline(self.composite).is_some()
     }
 }

@@ -166,7 +166,7 @@ pub(crate) fn prepare_views(
     queue: Res<RenderQueue>,
     mut warned: Local<bevy::platform::collections::HashSet<Entity>>,
 ) {
-    let Some(sizes) = texel_sizes(&textures) else { return };
+    let Some(sizes) = TexelSizes::of(&textures) else { return };
     let sun = brightest_sun(&lights);
     for mut item in &mut views {
         let viewport = item.view.viewport;
@@ -204,8 +204,7 @@ pub(crate) fn prepare_views(
             lighting: &clouds.settings.lighting,
             window,
         });
-        let model =
-            ModelUniform::new(&clouds.settings.model, clouds.settings.clock.seconds, &space, sizes);
+        let model = ModelUniform::new(&clouds.settings.model, clouds.settings.clock.seconds, &space, sizes);
         let world_from_local = Mat4::from_quat(space.local_from_world.inverse().as_quat());
         let mut own = None;
         let uniforms = match &mut item.uniforms {
@@ -235,9 +234,7 @@ fn space_below(
     settings: &CloudSettings,
 ) -> Option<TangentFrame> {
     let (centre, radius) = match atmosphere {
-        Some(a) => {
-            (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius))
-        }
+        Some(a) => (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius)),
         None => (DVec3::new(0.0, -EARTH_RADIUS, 0.0), EARTH_RADIUS),
     };
     let camera = view.world_from_view.translation().as_dvec3() + settings.model.world_offset;
@@ -280,17 +277,3 @@ fn window_state(
     };
     (key, pose)
 }
-
-/// Sizes of the bound textures; `None` while one is missing.
-fn texel_sizes(textures: &CloudTextureViews) -> Option<TexelSizes> {
-    let width = |view: &Option<bevy::render::render_resource::TextureView>| {
-        Some(view.as_ref()?.texture().width())
-    };
-    Some(TexelSizes {
-        billow: width(&textures.billow)?,
-        wisp: width(&textures.wisp)?,
-        coverage: width(&textures.coverage)?,
-        type_map: width(&textures.type_map)?,
-    })
-}
-

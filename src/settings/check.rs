@@ -111,10 +111,9 @@ impl Validate for CloudClock {
 impl Validate for CloudTextures {
     const ROOT: &'static str = "textures";
     fn validate_relations(&self) -> Result<(), SettingsError> {
-        for (field, value, min, max) in [
-            ("textures.volume_size", self.volume_size, 32, 256),
-            ("textures.map_size", self.map_size, 64, 4096),
-        ] {
+        for (field, value, min, max) in
+            [("textures.volume_size", self.volume_size, 32, 256), ("textures.map_size", self.map_size, 64, 4096)]
+        {
             if !value.is_power_of_two() {
                 return Err(SettingsError::NotPowerOfTwo { field, value, min, max });
             }

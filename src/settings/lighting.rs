@@ -29,11 +29,11 @@ pub struct CloudLighting {
     /// one exponential a sample. Default 8.
     #[reflect(@0..=16_u32)]
     pub octaves: u32,
-    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.5.
+    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.6.
     #[reflect(@0.0..=1.0_f32)]
     pub attenuation: f32,
     /// b: factor on the contribution from one octave to the next; at most `attenuation` keeps energy
-    /// bounded. Default 0.5.
+    /// bounded. Default 0.6.
     #[reflect(@0.0..=1.0_f32)]
     pub contribution: f32,
     /// c: factor on the phase function's asymmetry from one octave to the next (Wrenninge). Default 0.5.
@@ -41,7 +41,7 @@ pub struct CloudLighting {
     pub eccentricity: f32,
     /// Strength of a diffusion term for the orders of scattering that the octaves lose, with two octaves or more:
     /// fluence inside a bright cloud, in units of the sun's illuminance (two-stream theory: about 2 at the lit
-    /// side). It falls as 1/(1 + ¾(1 − ⟨cosθ⟩)τ). 0 is the thesis alone. Default 1.1.
+    /// side). It falls as 1/(1 + ¾(1 − ⟨cosθ⟩)τ). 0 is the thesis alone. Default 1.2.
     #[reflect(@0.0..=10.0_f32)]
     pub diffusion: f32,
     /// The phase function. Default [`PhaseFunction::HgDraine`].
@@ -94,10 +94,10 @@ impl Default for CloudLighting {
     fn default() -> Self {
         Self {
             octaves: 8,
-            attenuation: 0.5,
-            contribution: 0.5,
+            attenuation: 0.6,
+            contribution: 0.6,
             eccentricity: 0.5,
-            diffusion: 1.1,
+            diffusion: 1.2,
             phase: PhaseFunction::HgDraine,
             g: 0.8,
             g_back: -0.3,

@@ -46,7 +46,13 @@ impl Plugin for CloudSettingsPlugin {
             .register_type::<CloudPreset>()
             .init_asset::<CloudPreset>()
             .init_asset_loader::<preset::CloudPresetLoader>()
-            .add_systems(First, view::advance_clock.after(bevy::time::TimeSystems))
+            .add_systems(
+                First,
+                view::advance_clock
+                    .after(bevy::time::TimeSystems)
+                    // As Bevy's own clock is: it rotates messages, and this system has none.
+                    .ambiguous_with(bevy::ecs::message::message_update_system),
+            )
             .add_systems(
                 Last,
                 (

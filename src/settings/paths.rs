@@ -3,12 +3,14 @@
 use bevy::{
     math::DVec3,
     prelude::*,
-    reflect::{PartialReflect, ReflectMut, enums::{DynamicEnum, DynamicVariant}, TypeInfo},
+    reflect::{
+        PartialReflect, ReflectMut, TypeInfo,
+        enums::{DynamicEnum, DynamicVariant},
+    },
 };
 
 use super::{
-    CloudClock, CloudLighting, CloudModel, CloudQuality, CloudTextures, SettingsError, Validate,
-    check::fields,
+    CloudClock, CloudLighting, CloudModel, CloudQuality, CloudTextures, SettingsError, Validate, check::fields,
 };
 
 /// All settings that are plain data, together: what a path can reach.
@@ -122,9 +124,10 @@ fn parse_into(field: &mut dyn PartialReflect, text: &str) -> Result<(), String> 
         *v = three::<f64>(text)?.into();
     } else if let Some(TypeInfo::Enum(info)) = field.get_represented_type_info() {
         let names: Vec<&str> = info.variant_names().to_vec();
-        let wanted = names.iter().find(|name| snake_case(name) == text || **name == text).ok_or_else(|| {
-            format!("one of {}", names.iter().map(|n| snake_case(n)).collect::<Vec<_>>().join(", "))
-        })?;
+        let wanted = names
+            .iter()
+            .find(|name| snake_case(name) == text || **name == text)
+            .ok_or_else(|| format!("one of {}", names.iter().map(|n| snake_case(n)).collect::<Vec<_>>().join(", ")))?;
         field
             .try_apply(&DynamicEnum::new((*wanted).to_owned(), DynamicVariant::Unit))
             .map_err(|error| error.to_string())?;

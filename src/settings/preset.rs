@@ -43,7 +43,7 @@ pub enum PresetError {
         /// The file.
         file: String,
         /// Where and why.
-        source: ron::error::SpannedError,
+        source: Box<ron::error::SpannedError>,
     },
     /// A field is out of its range.
     #[error("{file}: {source}")]
@@ -82,11 +82,10 @@ impl CloudPreset {
     /// # Errors
     /// [`PresetError::Parse`] with line and column, or [`PresetError::Settings`] with field and range.
     pub fn parse(text: &str, file: &str) -> Result<Self, PresetError> {
-        let options = ron::Options::default()
-            .with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
+        let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
         let preset: Self = options
             .from_str(text)
-            .map_err(|source| PresetError::Parse { file: file.to_owned(), source })?;
+            .map_err(|source| PresetError::Parse { file: file.to_owned(), source: Box::new(source) })?;
         let named = |source| PresetError::Settings { file: file.to_owned(), source };
         preset.model.validate().map_err(named)?;
         preset.lighting.validate().map_err(named)?;
@@ -100,8 +99,7 @@ impl CloudPreset {
     /// [`PresetError::Io`], or as [`parse`](Self::parse).
     pub fn read(path: &std::path::Path) -> Result<Self, PresetError> {
         let file = path.display().to_string();
-        let text = std::fs::read_to_string(path)
-            .map_err(|source| PresetError::Io { file: file.clone(), source })?;
+        let text = std::fs::read_to_string(path).map_err(|source| PresetError::Io { file: file.clone(), source })?;
         Self::parse(&text, &file)
     }
 
@@ -135,10 +133,7 @@ impl AssetLoader for CloudPresetLoader {
     ) -> Result<CloudPreset, PresetError> {
         let file = context.path().to_string();
         let mut bytes = Vec::new();
-        reader
-            .read_to_end(&mut bytes)
-            .await
-            .map_err(|source| PresetError::Io { file: file.clone(), source })?;
+        reader.read_to_end(&mut bytes).await.map_err(|source| PresetError::Io { file: file.clone(), source })?;
         CloudPreset::parse(&String::from_utf8_lossy(&bytes), &file)
     }
 

@@ -32,11 +32,7 @@ pub struct BlueNoiseParams {
 
 impl Default for BlueNoiseParams {
     fn default() -> Self {
-        Self {
-            size: 128,
-            seed: 1,
-            sigma: 1.9,
-        }
+        Self { size: 128, seed: 1, sigma: 1.9 }
     }
 }
 
@@ -68,10 +64,7 @@ pub fn generate(params: BlueNoiseParams) -> Result<Vec<u8>, BlueNoiseError> {
     let mut seeds = SplitMix(params.seed);
     let mut rgba = vec![255; 4 * pixels];
     for channel in 0..3 {
-        let ranks = void_and_cluster(BlueNoiseParams {
-            seed: seeds.next(),
-            ..params
-        })?;
+        let ranks = void_and_cluster(BlueNoiseParams { seed: seeds.next(), ..params })?;
         for (pixel, rank) in rgba.chunks_exact_mut(4).zip(ranks) {
             pixel[channel] = (rank as usize * 256 / pixels) as u8;
         }
@@ -159,21 +152,15 @@ impl Field {
         // around more than once, as it should.
         let radius = (7.54 * sigma).ceil() as usize;
         let squared = |i: usize| (i as f64 - radius as f64).powi(2);
-        let gaussian = |x, y| {
-            ((-(squared(x) + squared(y)) / (2.0 * sigma * sigma)).exp() * HEIGHT).round() as u64
-        };
+        let gaussian = |x, y| ((-(squared(x) + squared(y)) / (2.0 * sigma * sigma)).exp() * HEIGHT).round() as u64;
         let width = 2 * radius + 1;
         let mut ties = SplitMix(params.seed);
         Self {
             size,
-            kernel: (0..width)
-                .map(|y| (0..width).map(|x| gaussian(x, y) << TIE_BITS).collect())
-                .collect(),
+            kernel: (0..width).map(|y| (0..width).map(|x| gaussian(x, y) << TIE_BITS).collect()).collect(),
             radius,
             on: vec![false; size * size],
-            energy: (0..size * size)
-                .map(|_| ties.next() >> (64 - TIE_BITS))
-                .collect(),
+            energy: (0..size * size).map(|_| ties.next() >> (64 - TIE_BITS)).collect(),
             clusters: vec![None; size],
             voids: vec![None; size],
         }
@@ -184,18 +171,13 @@ impl Field {
         self.on[pixel] = on;
         let wrap = self.size - 1;
         // Adding a multiple of the size keeps the difference positive.
-        let [x, y] =
-            [pixel % self.size, pixel / self.size].map(|c| c + 64 * self.size - self.radius);
+        let [x, y] = [pixel % self.size, pixel / self.size].map(|c| c + 64 * self.size - self.radius);
         for (j, weights) in self.kernel.iter().enumerate() {
             let row = (y + j) & wrap;
             let energies = &mut self.energy[row * self.size..][..self.size];
             for (i, weight) in weights.iter().enumerate() {
                 let energy = &mut energies[(x + i) & wrap];
-                *energy = if on {
-                    *energy + weight
-                } else {
-                    *energy - weight
-                };
+                *energy = if on { *energy + weight } else { *energy - weight };
             }
             self.clusters[row] = None;
             self.voids[row] = None;
@@ -204,19 +186,10 @@ impl Field {
 
     /// The point with the most energy.
     fn tightest_cluster(&mut self) -> usize {
-        let Self {
-            size,
-            on,
-            energy,
-            clusters,
-            ..
-        } = self;
+        let Self { size, on, energy, clusters, .. } = self;
         let rows = clusters.iter_mut().enumerate().filter_map(|(row, known)| {
             if known.is_none() {
-                *known = (row * *size..(row + 1) * *size)
-                    .filter(|&i| on[i])
-                    .map(|i| (energy[i], i))
-                    .max();
+                *known = (row * *size..(row + 1) * *size).filter(|&i| on[i]).map(|i| (energy[i], i)).max();
             }
             *known
         });
@@ -225,19 +198,10 @@ impl Field {
 
     /// The empty pixel with the least energy.
     fn largest_void(&mut self) -> usize {
-        let Self {
-            size,
-            on,
-            energy,
-            voids,
-            ..
-        } = self;
+        let Self { size, on, energy, voids, .. } = self;
         let rows = voids.iter_mut().enumerate().filter_map(|(row, known)| {
             if known.is_none() {
-                *known = (row * *size..(row + 1) * *size)
-                    .filter(|&i| !on[i])
-                    .map(|i| (energy[i], i))
-                    .min();
+                *known = (row * *size..(row + 1) * *size).filter(|&i| !on[i]).map(|i| (energy[i], i)).min();
             }
             *known
         });

@@ -42,6 +42,10 @@ pub use profile::{CUMULUS_PROFILE, GRADIENT_SIZE, STRATUS_PROFILE, vertical_prof
 pub use progress::CloudTextureStatus;
 pub use slots::{CloudTextureError, CloudTextureFault, CloudTextureSlot};
 
+/// Where textures change hands in `Render`: what reads them comes after.
+#[derive(SystemSet, Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct TextureSwaps;
+
 /// The main-world half: shaders, slots, status. The render half is [`build_render`].
 pub(crate) struct CloudTexturesPlugin;
 
@@ -62,7 +66,7 @@ impl Plugin for CloudTexturesPlugin {
             .register_type::<CloudTextureStatus>()
             .add_message::<CloudTextureError>()
             .add_systems(PreStartup, slots::load_blue_noise.run_if(resource_exists::<Assets<Image>>))
-            .add_systems(First, progress::report)
+            .add_systems(First, progress::report.ambiguous_with(bevy::ecs::message::message_update_system))
             .add_systems(Last, slots::check_slots.run_if(resource_exists::<Assets<Image>>));
     }
 }
@@ -78,6 +82,6 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
         .init_gpu_resource::<pipelines::BakePipelines>()
         .init_gpu_resource::<bake::Bakery>()
         .add_systems(ExtractSchedule, bake::extract)
-        .add_systems(Render, bake::plan.in_set(RenderSystems::PrepareResources))
+        .add_systems(Render, bake::plan.in_set(RenderSystems::PrepareResources).in_set(TextureSwaps))
         .add_systems(RenderGraph, bake::bake.before(camera_driver));
 }

@@ -76,12 +76,7 @@ fn best_permutation(n: usize) -> Vec<usize> {
     (2..=bound.max(2))
         .rev()
         .find_map(|at_least| {
-            let mut walk = PermutationWalk {
-                n,
-                at_least,
-                rows: vec![0],
-                best: None,
-            };
+            let mut walk = PermutationWalk { n, at_least, rows: vec![0], best: None };
             walk.descend();
             walk.best
         })
@@ -120,8 +115,7 @@ impl PermutationWalk {
 
     fn fits(&self, column: usize, row: usize) -> bool {
         let cell = [column, row];
-        self.cells()
-            .all(|c| c[1] != row && distance_squared(c, cell, self.n) >= self.at_least)
+        self.cells().all(|c| c[1] != row && distance_squared(c, cell, self.n) >= self.at_least)
     }
 
     fn cells(&self) -> impl Iterator<Item = [usize; 2]> {
@@ -130,13 +124,8 @@ impl PermutationWalk {
 
     /// Σ 1/d² over all pairs, in units of 2⁻³².
     fn energy(&self) -> u64 {
-        let pairs = self
-            .cells()
-            .enumerate()
-            .flat_map(|(i, a)| self.cells().take(i).map(move |b| (a, b)));
-        pairs
-            .map(|(a, b)| (1 << 32) / distance_squared(a, b, self.n))
-            .sum()
+        let pairs = self.cells().enumerate().flat_map(|(i, a)| self.cells().take(i).map(move |b| (a, b)));
+        pairs.map(|(a, b)| (1 << 32) / distance_squared(a, b, self.n)).sum()
     }
 }
 
@@ -154,9 +143,7 @@ fn best_order(n: usize, cells: Vec<[usize; 2]>) -> Vec<[usize; 2]> {
         }
         for i in (2..n).rev() {
             // Knuth's 64-bit linear congruential generator; its high bits are the good ones.
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
             order.swap(i, 1 + (state >> 33) as usize % i);
         }
     }
@@ -205,14 +192,8 @@ fn order_cost(n: usize, order: &[[usize; 2]]) -> u64 {
 /// equally good orders the least wins.
 fn depth_alignment(n: usize, order: &[[usize; 2]]) -> u64 {
     let centred = |i: usize| 2 * i as i64 - (n as i64 - 1);
-    let along = |axis: usize| {
-        order
-            .iter()
-            .enumerate()
-            .map(|(i, c)| centred(i) * centred(c[axis]))
-            .sum::<i64>()
-            .unsigned_abs()
-    };
+    let along =
+        |axis: usize| order.iter().enumerate().map(|(i, c)| centred(i) * centred(c[axis])).sum::<i64>().unsigned_abs();
     along(0) + along(1)
 }
 
@@ -240,25 +221,12 @@ static PATTERNS: [&[[f32; 2]]; MAX_WINDOW] = [
     &centres([0x00, 0x75, 0x31, 0x57, 0x13, 0x26, 0x62, 0x44]),
     &centres([0x00, 0x37, 0x73, 0x41, 0x86, 0x24, 0x68, 0x12, 0x55]),
     &centres([0x00, 0x84, 0x39, 0x55, 0x97, 0x71, 0x13, 0x68, 0x26, 0x42]),
-    &centres([
-        0x00, 0x26, 0x7a, 0x95, 0x41, 0xa8, 0x13, 0x67, 0x82, 0x39, 0x54,
-    ]),
-    &centres([
-        0x00, 0x26, 0x82, 0xb8, 0x54, 0x9b, 0x39, 0x13, 0x77, 0x41, 0xa5, 0x6a,
-    ]),
-    &centres([
-        0x00, 0x47, 0xab, 0x15, 0x79, 0xb3, 0x5c, 0x96, 0x32, 0xc8, 0x81, 0x2a, 0x64,
-    ]),
-    &centres([
-        0x00, 0x84, 0x27, 0xac, 0x41, 0xc6, 0x69, 0x13, 0x7d, 0xda, 0x55, 0xb2, 0x3b, 0x98,
-    ]),
-    &centres([
-        0x00, 0xaa, 0x55, 0x3c, 0x82, 0xd7, 0xbe, 0x69, 0x14, 0xeb, 0x41, 0x96, 0x7d, 0xc3, 0x28,
-    ]),
-    &centres([
-        0x00, 0x7d, 0xb7, 0x2a, 0x52, 0xcf, 0xf8, 0x85, 0x3e, 0xd3, 0xab, 0x14, 0x69, 0x91, 0xec,
-        0x46,
-    ]),
+    &centres([0x00, 0x26, 0x7a, 0x95, 0x41, 0xa8, 0x13, 0x67, 0x82, 0x39, 0x54]),
+    &centres([0x00, 0x26, 0x82, 0xb8, 0x54, 0x9b, 0x39, 0x13, 0x77, 0x41, 0xa5, 0x6a]),
+    &centres([0x00, 0x47, 0xab, 0x15, 0x79, 0xb3, 0x5c, 0x96, 0x32, 0xc8, 0x81, 0x2a, 0x64]),
+    &centres([0x00, 0x84, 0x27, 0xac, 0x41, 0xc6, 0x69, 0x13, 0x7d, 0xda, 0x55, 0xb2, 0x3b, 0x98]),
+    &centres([0x00, 0xaa, 0x55, 0x3c, 0x82, 0xd7, 0xbe, 0x69, 0x14, 0xeb, 0x41, 0x96, 0x7d, 0xc3, 0x28]),
+    &centres([0x00, 0x7d, 0xb7, 0x2a, 0x52, 0xcf, 0xf8, 0x85, 0x3e, 0xd3, 0xab, 0x14, 0x69, 0x91, 0xec, 0x46]),
 ];
 
 #[cfg(test)]
@@ -319,11 +287,7 @@ mod tests {
             let closest = pairs.map(|(i, j)| distance(i, j)).min();
             let closest_in_time = (0..n).map(|i| distance(i, i + 1)).min();
             assert_eq!(closest, Some(LEAST[n - 1][0]), "window of {n}");
-            assert_eq!(
-                closest_in_time,
-                Some(LEAST[n - 1][1]),
-                "window of {n}, frame to frame"
-            );
+            assert_eq!(closest_in_time, Some(LEAST[n - 1][1]), "window of {n}, frame to frame");
         }
     }
 
@@ -335,10 +299,7 @@ mod tests {
             if rows.len() == n {
                 let cell = |i: usize| [i, rows[i]];
                 let pairs = (0..n).flat_map(|i| (0..i).map(move |j| (i, j)));
-                return pairs
-                    .map(|(i, j)| distance_squared(cell(i), cell(j), n))
-                    .min()
-                    .unwrap_or(0);
+                return pairs.map(|(i, j)| distance_squared(cell(i), cell(j), n)).min().unwrap_or(0);
             }
             let mut most = 0;
             for row in 0..n {

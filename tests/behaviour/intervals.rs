@@ -73,90 +73,49 @@ fn intervals_agree_with_the_reference_from_every_viewpoint() {
         let ray = ray.map(f64::from);
         let [h0, mu, bottom, top, t_max] = ray;
         let shells = [bottom, top, 0.0];
-        if shells
-            .iter()
-            .any(|&shell| root_tolerance(ray, shell, 0.0).is_none())
-        {
+        if shells.iter().any(|&shell| root_tolerance(ray, shell, 0.0).is_none()) {
             assert!(found.iter().all(|t| t.is_finite()), "{ray:?}: {found:?}");
             undecided += 1;
             continue;
         }
         // What may be off, at an end that lies on a shell; ends at 0 and t_max are exact.
         let tolerance = |t: f64| {
-            let on = |shell: &&f64| {
-                shell_roots(h0, mu, **shell, PLANET_RADIUS).is_some_and(|roots| roots.contains(&t))
-            };
-            shells.iter().find(on).map_or(0.0, |&shell| {
-                root_tolerance(ray, shell, t).unwrap_or(f64::INFINITY)
-            })
+            let on = |shell: &&f64| shell_roots(h0, mu, **shell, PLANET_RADIUS).is_some_and(|roots| roots.contains(&t));
+            shells.iter().find(on).map_or(0.0, |&shell| root_tolerance(ray, shell, t).unwrap_or(f64::INFINITY))
         };
         let mut expected = shell_intervals(h0, mu, bottom, top, PLANET_RADIUS, t_max);
-        let mut found: Vec<[f64; 2]> = found
-            .as_chunks::<2>()
-            .0
-            .iter()
-            .map(|i| i.map(f64::from))
-            .filter(|i| *i != [0.0; 2])
-            .collect();
+        let mut found: Vec<[f64; 2]> =
+            found.as_chunks::<2>().0.iter().map(|i| i.map(f64::from)).filter(|i| *i != [0.0; 2]).collect();
         twice += u32::from(expected.len() == 2);
         if found.len() != expected.len() {
             // A sliver may be lost or found; nothing longer.
-            let slack = expected
-                .iter()
-                .flatten()
-                .map(|&t| tolerance(t))
-                .fold(16.0 * U * t_max, f64::max);
+            let slack = expected.iter().flatten().map(|&t| tolerance(t)).fold(16.0 * U * t_max, f64::max);
             expected.retain(|[a, b]| b - a > 2.0 * slack);
             found.retain(|[a, b]| b - a > 2.0 * slack);
         }
-        assert_eq!(
-            found.len(),
-            expected.len(),
-            "{ray:?}: {found:?}, not {expected:?}"
-        );
+        assert_eq!(found.len(), expected.len(), "{ray:?}: {found:?}, not {expected:?}");
         for (&t, &exact) in found.iter().flatten().zip(expected.iter().flatten()) {
             let (error, allowed) = ((t - exact).abs(), tolerance(exact));
-            assert!(
-                error <= allowed,
-                "{ray:?}: {t}, not {exact}: {error} m off, {allowed} m allowed"
-            );
+            assert!(error <= allowed, "{ray:?}: {t}, not {exact}: {error} m off, {allowed} m allowed");
         }
     }
-    println!(
-        "intervals: {undecided} rays too near a tangent for f32, {twice} cross the shell twice"
-    );
-    assert!(
-        undecided < rays.len() / 10 && twice > 500,
-        "{undecided} undecided, {twice} twice"
-    );
+    println!("intervals: {undecided} rays too near a tangent for f32, {twice} cross the shell twice");
+    assert!(undecided < rays.len() / 10 && twice > 500, "{undecided} undecided, {twice} twice");
 }
 
 #[test]
 fn level_rays_are_not_lost() {
     // b = 0 exactly: from the ground, below, at the lower shell, inside, at the upper shell, above.
     let heights = [0.0_f32, 500.0, 1500.0, 2500.0, 4000.0, 9000.0];
-    let rays: Vec<[f32; 5]> = heights
-        .iter()
-        .flat_map(|&h| [0.0, -0.0].map(|mu| [h, mu, 1500.0, 4000.0, 1e6]))
-        .collect();
+    let rays: Vec<[f32; 5]> =
+        heights.iter().flat_map(|&h| [0.0, -0.0].map(|mu| [h, mu, 1500.0, 4000.0, 1e6])).collect();
     let found = intervals_on_gpu(&mut shader_app(), &rays);
-    let reach = |h0: f64, shell: f64| {
-        ((shell - h0) * (2.0 * PLANET_RADIUS + h0 + shell))
-            .max(0.0)
-            .sqrt()
-    };
+    let reach = |h0: f64, shell: f64| ((shell - h0) * (2.0 * PLANET_RADIUS + h0 + shell)).max(0.0).sqrt();
     for (ray, found) in rays.iter().zip(&found) {
         let h0 = f64::from(ray[0]);
-        let expected = if h0 >= 4000.0 {
-            [0.0; 4]
-        } else {
-            [reach(h0, 1500.0), reach(h0, 4000.0), 0.0, 0.0]
-        };
+        let expected = if h0 >= 4000.0 { [0.0; 4] } else { [reach(h0, 1500.0), reach(h0, 4000.0), 0.0, 0.0] };
         for (t, expected) in found.iter().zip(expected) {
-            assert!(
-                (f64::from(*t) - expected).abs() <= 1e-6 * expected,
-                "{ray:?}: {found:?}"
-            );
+            assert!((f64::from(*t) - expected).abs() <= 1e-6 * expected, "{ray:?}: {found:?}");
         }
     }
 }
@@ -179,22 +138,12 @@ fn rays_that_dip_below_the_layer_and_come_out_again_have_both_intervals() {
         assert_eq!(a == 0.0, ray[0] < top, "{ray:?}: {found:?}");
         let along = |t: f32| {
             let (t, mu) = (f64::from(t), f64::from(ray[1]));
-            altitude(
-                DVec3::new(t * (1.0 - mu * mu).sqrt(), f64::from(ray[0]) + t * mu, 0.0),
-                PLANET_RADIUS,
-            )
+            altitude(DVec3::new(t * (1.0 - mu * mu).sqrt(), f64::from(ray[0]) + t * mu, 0.0), PLANET_RADIUS)
         };
         for (t, shell) in [(b, bottom), (c, bottom), (d, top)] {
-            assert!(
-                (along(t) - f64::from(shell)).abs() < 20.0,
-                "{ray:?}: {found:?}: {}",
-                along(t)
-            );
+            assert!((along(t) - f64::from(shell)).abs() < 20.0, "{ray:?}: {found:?}: {}", along(t));
         }
-        assert!(
-            (along(0.5 * (b + c)) - 700.0).abs() < 20.0,
-            "{ray:?}: {found:?}"
-        );
+        assert!((along(0.5 * (b + c)) - 700.0).abs() < 20.0, "{ray:?}: {found:?}");
     }
 }
 
@@ -218,9 +167,5 @@ fn the_planet_ends_rays_from_above_it_only() {
     for ((ray, sees), found) in cases.iter().zip(&found) {
         assert_eq!(found[1] > found[0], *sees, "{ray:?}: {found:?}");
     }
-    assert!(
-        (found[5][0] - 1000.0).abs() < 0.01 && (found[5][1] - 2000.0).abs() < 0.01,
-        "{:?}",
-        found[5]
-    );
+    assert!((found[5][0] - 1000.0).abs() < 0.01 && (found[5][1] - 2000.0).abs() < 0.01, "{:?}", found[5]);
 }

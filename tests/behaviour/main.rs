@@ -4,8 +4,8 @@
 mod bad_input;
 mod bound;
 mod cameras;
-mod goldens;
 mod drift;
+mod goldens;
 mod gpu;
 mod halves;
 mod headless;

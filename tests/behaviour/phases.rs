@@ -16,31 +16,10 @@ use crate::{
 
 /// Diameter; g_HG, g_D, α, w; p at cosθ = 1, .99, .5, 0, −1; mean cosine. From the fit's authors' formulas.
 const TABLE: [[f64; 11]; 4] = [
-    [
-        5.0, 0.970678, 0.508342, 17.0681, 0.447829, 101.131, 1.26445, 0.0249032, 0.00288214,
-        0.0147816, 0.84342,
-    ],
-    [
-        10.0, 0.988177, 0.555671, 21.9955, 0.481955, 586.86, 0.833431, 0.0214863, 0.00172563,
-        0.012715, 0.86416,
-    ],
-    [
-        20.0, 0.994610, 0.593791, 27.1137, 0.498159, 2742.51, 0.732359, 0.0188364, 0.00114718,
-        0.010914, 0.87931,
-    ],
-    [
-        50.0,
-        0.997952,
-        0.625084,
-        32.3154,
-        0.507618,
-        18673.4,
-        0.721923,
-        0.0166804,
-        0.000800114,
-        0.00948307,
-        0.89119,
-    ],
+    [5.0, 0.970678, 0.508342, 17.0681, 0.447829, 101.131, 1.26445, 0.0249032, 0.00288214, 0.0147816, 0.84342],
+    [10.0, 0.988177, 0.555671, 21.9955, 0.481955, 586.86, 0.833431, 0.0214863, 0.00172563, 0.012715, 0.86416],
+    [20.0, 0.994610, 0.593791, 27.1137, 0.498159, 2742.51, 0.732359, 0.0188364, 0.00114718, 0.010914, 0.87931],
+    [50.0, 0.997952, 0.625084, 32.3154, 0.507618, 18673.4, 0.721923, 0.0166804, 0.000800114, 0.00948307, 0.89119],
 ];
 const COSINES: [f32; 5] = [1.0, 0.99, 0.5, 0.0, -1.0];
 
@@ -69,26 +48,15 @@ fn rounded(phase: Phase) -> Phase {
     match phase {
         Phase::Isotropic => phase,
         Phase::HenyeyGreenstein { .. } => Phase::HenyeyGreenstein { g: x },
-        Phase::TwoLobe { .. } => Phase::TwoLobe {
-            g: x,
-            g_back: y,
-            mix: z,
-        },
-        Phase::HgDraine(_) => Phase::HgDraine(HgDraine {
-            g_hg: x,
-            g_d: y,
-            alpha: z,
-            w,
-        }),
+        Phase::TwoLobe { .. } => Phase::TwoLobe { g: x, g_back: y, mix: z },
+        Phase::HgDraine(_) => Phase::HgDraine(HgDraine { g_hg: x, g_d: y, alpha: z, w }),
     }
 }
 
 fn random_phase(rng: &mut StdRng) -> Phase {
     match rng.random_range(0..4) {
         0 => Phase::Isotropic,
-        1 => Phase::HenyeyGreenstein {
-            g: rng.random_range(-0.998..0.998),
-        },
+        1 => Phase::HenyeyGreenstein { g: rng.random_range(-0.998..0.998) },
         2 => Phase::TwoLobe {
             g: rng.random_range(-0.99..0.99),
             g_back: rng.random_range(-0.99..0.99),
@@ -108,16 +76,8 @@ fn every_phase() -> Vec<Phase> {
         Phase::HenyeyGreenstein { g: -0.6 },
         Phase::HenyeyGreenstein { g: 0.998 },
         Phase::HenyeyGreenstein { g: -0.99 },
-        Phase::TwoLobe {
-            g: 0.8,
-            g_back: -0.3,
-            mix: 0.3,
-        },
-        Phase::TwoLobe {
-            g: 0.99,
-            g_back: -0.99,
-            mix: 0.5,
-        },
+        Phase::TwoLobe { g: 0.8, g_back: -0.3, mix: 0.3 },
+        Phase::TwoLobe { g: 0.99, g_back: -0.99, mix: 0.5 },
         droplets(5.0),
         droplets(12.0),
         droplets(50.0),
@@ -170,17 +130,12 @@ fn the_shader_agrees_with_the_reference() {
 
 #[test]
 fn a_cosine_just_beyond_one_is_harmless() {
-    let inputs: Vec<(Phase, f32, f32)> = every_phase()
-        .into_iter()
-        .flat_map(|p| [(p, 1.000_001, 1.0), (p, -1.000_001, 1.0)])
-        .collect();
+    let inputs: Vec<(Phase, f32, f32)> =
+        every_phase().into_iter().flat_map(|p| [(p, 1.000_001, 1.0), (p, -1.000_001, 1.0)]).collect();
     for (input, p) in inputs.iter().zip(phases_on_gpu(&mut shader_app(), &inputs)) {
         let peak = rounded(input.0).value(input.1.clamp(-1.0, 1.0).into(), 1.0);
         // In the direction away from the peak the overshoot counts, by what it is.
-        assert!(
-            (f64::from(p) / peak - 1.0).abs() < 1e-4,
-            "{input:?}: {p}, not {peak}"
-        );
+        assert!((f64::from(p) / peak - 1.0).abs() < 1e-4, "{input:?}: {p}, not {peak}");
     }
 }
 
@@ -189,10 +144,7 @@ fn every_phase_function_integrates_to_one() {
     for phase in every_phase() {
         for eccentricity in [1.0, 0.5, 0.125] {
             let total = over_sphere(&phase, eccentricity, |_| 1.0);
-            assert!(
-                (total - 1.0).abs() < 1e-3,
-                "{phase:?}, eccentricity {eccentricity}: {total}"
-            );
+            assert!((total - 1.0).abs() < 1e-3, "{phase:?}, eccentricity {eccentricity}: {total}");
         }
     }
 }
@@ -201,25 +153,16 @@ fn every_phase_function_integrates_to_one() {
 fn every_phase_function_integrates_to_one_on_the_gpu() {
     let nodes = 20_000;
     // Cosines as f32 can tell them apart, dense at both ends.
-    let near: Vec<f32> = (0..=nodes)
-        .map(|k| 1.0 - (f64::from(k) / f64::from(nodes)).powi(4) as f32)
-        .collect();
-    let cosines: Vec<f32> = near
-        .iter()
-        .map(|c| -c)
-        .chain(near.iter().rev().copied())
-        .collect();
+    let near: Vec<f32> = (0..=nodes).map(|k| 1.0 - (f64::from(k) / f64::from(nodes)).powi(4) as f32).collect();
+    let cosines: Vec<f32> = near.iter().map(|c| -c).chain(near.iter().rev().copied()).collect();
     let phases = every_phase();
-    let inputs: Vec<(Phase, f32, f32)> = phases
-        .iter()
-        .flat_map(|&phase| cosines.iter().map(move |&c| (phase, c, 1.0)))
-        .collect();
+    let inputs: Vec<(Phase, f32, f32)> =
+        phases.iter().flat_map(|&phase| cosines.iter().map(move |&c| (phase, c, 1.0))).collect();
     let found = phases_on_gpu(&mut shader_app(), &inputs);
     for (phase, values) in phases.iter().zip(found.chunks(cosines.len())) {
         let trapezoids = cosines.windows(2).zip(values.windows(2));
-        let total: f64 = trapezoids
-            .map(|(c, p)| PI * f64::from(p[0] + p[1]) * (f64::from(c[1]) - f64::from(c[0])))
-            .sum();
+        let total: f64 =
+            trapezoids.map(|(c, p)| PI * f64::from(p[0] + p[1]) * (f64::from(c[1]) - f64::from(c[0]))).sum();
         assert!((total - 1.0).abs() < 1e-3, "{phase:?}: {total}");
     }
 }
@@ -227,10 +170,7 @@ fn every_phase_function_integrates_to_one_on_the_gpu() {
 #[test]
 fn droplets_scatter_as_published() {
     let agrees = |what: &str, d: f64, found: f64, expected: f64| {
-        assert!(
-            (found / expected - 1.0).abs() < 1e-4,
-            "{what} at {d} µm: {found}, not {expected}"
-        );
+        assert!((found / expected - 1.0).abs() < 1e-4, "{what} at {d} µm: {found}, not {expected}");
     };
     let droplets = |d| HgDraine::from_diameter(d).unwrap();
     for [d, g_hg, g_d, alpha, w, rest @ ..] in TABLE {
@@ -244,17 +184,10 @@ fn droplets_scatter_as_published() {
             let cosine = (f64::from(*cosine) * 100.0).round() / 100.0;
             agrees("p", d, fit.value(cosine), expected);
         }
-        agrees(
-            "mean cosine",
-            d,
-            over_sphere(&Phase::HgDraine(fit), 1.0, |cosine| cosine),
-            rest[5],
-        );
+        agrees("mean cosine", d, over_sphere(&Phase::HgDraine(fit), 1.0, |cosine| cosine), rest[5]);
     }
-    let inputs: Vec<(Phase, f32, f32)> = TABLE
-        .iter()
-        .flat_map(|row| COSINES.map(|cosine| (Phase::HgDraine(droplets(row[0])), cosine, 1.0)))
-        .collect();
+    let inputs: Vec<(Phase, f32, f32)> =
+        TABLE.iter().flat_map(|row| COSINES.map(|cosine| (Phase::HgDraine(droplets(row[0])), cosine, 1.0))).collect();
     let found = phases_on_gpu(&mut shader_app(), &inputs);
     for (row, found) in TABLE.iter().zip(found.as_chunks::<5>().0) {
         for (expected, found) in row[5..].iter().zip(found) {
@@ -266,27 +199,15 @@ fn droplets_scatter_as_published() {
 #[test]
 fn droplets_outside_the_fit_are_refused() {
     for d in [0.0, 4.99, 50.01, -12.0, f64::NAN, f64::INFINITY] {
-        let Err(SettingsError::OutOfRange {
-            field, min, max, ..
-        }) = HgDraine::from_diameter(d)
-        else {
+        let Err(SettingsError::OutOfRange { field, min, max, .. }) = HgDraine::from_diameter(d) else {
             panic!("{d} µm was taken");
         };
         assert_eq!([field, min, max], ["lighting.droplet_diameter", "5", "50"]);
     }
-    let lighting = CloudLighting {
-        droplet_diameter: 3.0,
-        ..Default::default()
-    };
+    let lighting = CloudLighting { droplet_diameter: 3.0, ..Default::default() };
     assert!(Phase::from_settings(&lighting).is_err());
-    let lighting = CloudLighting {
-        phase: PhaseFunction::HenyeyGreenstein,
-        ..lighting
-    };
-    assert_eq!(
-        Phase::from_settings(&lighting),
-        Ok(Phase::HenyeyGreenstein { g: 0.8_f32.into() })
-    );
+    let lighting = CloudLighting { phase: PhaseFunction::HenyeyGreenstein, ..lighting };
+    assert_eq!(Phase::from_settings(&lighting), Ok(Phase::HenyeyGreenstein { g: 0.8_f32.into() }));
 }
 
 #[test]
@@ -302,10 +223,7 @@ fn draine_spans_the_classic_phase_functions() {
             (draine(g, 1.0, cosine), cornette_shanks),
             (draine(0.0, 1.0, cosine), rayleigh),
         ] {
-            assert!(
-                (found / expected - 1.0).abs() < 1e-12,
-                "cosθ {cosine}: {found}, not {expected}"
-            );
+            assert!((found / expected - 1.0).abs() < 1e-12, "cosθ {cosine}: {found}, not {expected}");
         }
     }
 }

@@ -51,9 +51,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
 
 /// The largest value, with the input that gave it; a NaN counts as largest.
 pub fn worst<T>(errors: impl Iterator<Item = (f64, T)>) -> (f64, T) {
-    errors
-        .reduce(|a, b| if a.0.is_nan() || a.0 >= b.0 { a } else { b })
-        .expect("nothing was compared")
+    errors.reduce(|a, b| if a.0.is_nan() || a.0 >= b.0 { a } else { b }).expect("nothing was compared")
 }
 
 #[test]
@@ -72,12 +70,7 @@ fn altitude_is_within_two_centimetres_up_to_60_km_away() {
         })
         .collect();
     let found = altitudes_on_gpu(&mut shader_app(), &points);
-    let error = |(p, [h]): (&[f32; 3], &[f32; 1])| {
-        (
-            (altitude(double(*p), PLANET_RADIUS) - f64::from(*h)).abs(),
-            *p,
-        )
-    };
+    let error = |(p, [h]): (&[f32; 3], &[f32; 1])| ((altitude(double(*p), PLANET_RADIUS) - f64::from(*h)).abs(), *p);
     let (error, p) = worst(points.iter().zip(&found).map(error));
     println!("altitude: worst {error} m at {p:?}");
     assert!(error < 0.02, "{error} m at {p:?}");
@@ -86,16 +79,9 @@ fn altitude_is_within_two_centimetres_up_to_60_km_away() {
 #[test]
 fn altitude_stays_good_a_thousand_kilometres_away_and_finite_everywhere() {
     let mut rng = StdRng::seed_from_u64(2);
-    let mut points: Vec<[f32; 3]> = (0..COUNT)
-        .map(|_| [1e6, 3e5, 1e6].map(|size: f32| rng.random_range(-size..size)))
-        .collect();
-    points.extend([
-        [0.0; 3],
-        [0.0, -R, 0.0],
-        [0.0, -2.0 * R, 0.0],
-        [0.0, -3.0 * R, 1.0],
-        [5e7, 1e8, 1.0],
-    ]);
+    let mut points: Vec<[f32; 3]> =
+        (0..COUNT).map(|_| [1e6, 3e5, 1e6].map(|size: f32| rng.random_range(-size..size))).collect();
+    points.extend([[0.0; 3], [0.0, -R, 0.0], [0.0, -2.0 * R, 0.0], [0.0, -3.0 * R, 1.0], [5e7, 1e8, 1.0]]);
     let found = altitudes_on_gpu(&mut shader_app(), &points);
     for (p, [h]) in points.iter().zip(found) {
         let exact = altitude(double(*p), PLANET_RADIUS);
@@ -103,15 +89,8 @@ fn altitude_stays_good_a_thousand_kilometres_away_and_finite_everywhere() {
         let lift = exact - f64::from(p[1]);
         let allowed = 2.0 * U * (exact.abs() + f64::from(p[1]).abs()) + 8.0 * U * lift.abs();
         // Behind the planet's centre the distance to it is what gets rounded.
-        let allowed = if p[1] <= -R {
-            allowed.max(2.0)
-        } else {
-            allowed
-        };
-        assert!(
-            (exact - f64::from(h)).abs() <= allowed,
-            "{h} m, not {exact} m, at {p:?}"
-        );
+        let allowed = if p[1] <= -R { allowed.max(2.0) } else { allowed };
+        assert!((exact - f64::from(h)).abs() <= allowed, "{h} m, not {exact} m, at {p:?}");
     }
 }
 
@@ -119,9 +98,7 @@ fn altitudes_on_gpu(app: &mut App, points: &[[f32; 3]]) -> Vec<[f32; 1]> {
     on_gpu(
         app,
         "import bevy_cumulus::model::planet::altitude;",
-        &format!(
-            "results[o] = altitude(vec3<f32>(values[i], values[i + 1u], values[i + 2u]), {R});"
-        ),
+        &format!("results[o] = altitude(vec3<f32>(values[i], values[i + 1u], values[i + 2u]), {R});"),
         points,
     )
 }
@@ -137,26 +114,12 @@ fn map_coordinates_agree_with_the_reference() {
         .map(|k| {
             let size = [100.0_f32, 60_000.0, 1e6, 6e6][k % 4];
             // Both sides of where the polynomial gives way to half angles.
-            let x = if k % 40 == 3 {
-                0.2 * R
-            } else {
-                rng.random_range(-size..size)
-            };
-            let z = if k % 40 == 3 {
-                rng.random_range(-10.0..10.0)
-            } else {
-                rng.random_range(-size..size)
-            };
+            let x = if k % 40 == 3 { 0.2 * R } else { rng.random_range(-size..size) };
+            let z = if k % 40 == 3 { rng.random_range(-10.0..10.0) } else { rng.random_range(-size..size) };
             [x, rng.random_range(-size.min(3e4)..3e4), z]
         })
         .collect();
-    points.extend([
-        [0.0, 2000.0, 0.0],
-        [1e-20, 0.0, 0.0],
-        [0.0, -R, 0.0],
-        [0.0, -3.0 * R, 0.0],
-        [0.0, -R, 1.0],
-    ]);
+    points.extend([[0.0, 2000.0, 0.0], [1e-20, 0.0, 0.0], [0.0, -R, 0.0], [0.0, -3.0 * R, 0.0], [0.0, -R, 1.0]]);
     points.extend([[-3.0 * R, -1.5 * R, 4.0], [0.0, -1.9 * R, 6e6]]);
     let found: Vec<[f32; 2]> = on_gpu(
         &mut shader_app(),
@@ -187,20 +150,10 @@ fn a_step_of_the_march_agrees_with_the_reference() {
         .map(|_| {
             let depth = 10_f64.powf(rng.random_range(-12.0..2.0));
             let dt: f32 = rng.random_range(0.5..5000.0);
-            [
-                rng.random_range(0.0..1e5),
-                (depth / f64::from(dt)) as f32,
-                dt,
-            ]
+            [rng.random_range(0.0..1e5), (depth / f64::from(dt)) as f32, dt]
         })
         .collect();
-    steps.extend([
-        [3.0, 0.0, 90.0],
-        [0.0, 0.1, 90.0],
-        [1.0, 1.0, 1e4],
-        [1.0, 0.5, 1.0],
-        [1.0, 0.499_999_97, 1.0],
-    ]);
+    steps.extend([[3.0, 0.0, 90.0], [0.0, 0.1, 90.0], [1.0, 1.0, 1e4], [1.0, 0.5, 1.0], [1.0, 0.499_999_97, 1.0]]);
     let found: Vec<[f32; 3]> = on_gpu(
         &mut shader_app(),
         "import bevy_cumulus::render::march::integrate::{step_energy_conserving, step_naive};",
@@ -216,18 +169,9 @@ fn a_step_of_the_march_agrees_with_the_reference() {
         let exact = step_energy_conserving(source * DVec3::new(1.0, 0.5, 0.25), sigma_t, dt);
         // WGSL allows exp(−x) 3 + 2x units of 2 U; 1 − exp(−x) divides that by at least 0.39.
         let allowed = 2e-6 * exact;
-        assert!(
-            (f64::from(found[0]) - exact.x).abs() <= allowed.x,
-            "{step:?}: {found:?}, not {exact}"
-        );
-        assert!(
-            (f64::from(found[1]) - exact.z).abs() <= allowed.z,
-            "{step:?}: {found:?}, not {exact}"
-        );
-        assert!(
-            (f64::from(found[2]) - 0.5 * source * dt).abs() <= 4.0 * U * source * dt,
-            "{step:?}: {found:?}"
-        );
+        assert!((f64::from(found[0]) - exact.x).abs() <= allowed.x, "{step:?}: {found:?}, not {exact}");
+        assert!((f64::from(found[1]) - exact.z).abs() <= allowed.z, "{step:?}: {found:?}, not {exact}");
+        assert!((f64::from(found[2]) - 0.5 * source * dt).abs() <= 4.0 * U * source * dt, "{step:?}: {found:?}");
     }
     assert!(mean_transmittance(1e-30) == 1.0);
 }

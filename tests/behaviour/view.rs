@@ -10,8 +10,8 @@ use bevy::{
         RenderApp,
         render_asset::RenderAssets,
         render_resource::{
-            BufferDescriptor, BufferUsages, CommandEncoderDescriptor, TexelCopyBufferInfo,
-            TexelCopyBufferLayout, TextureFormat, TextureUsages,
+            BufferDescriptor, BufferUsages, CommandEncoderDescriptor, TexelCopyBufferInfo, TexelCopyBufferLayout,
+            TextureFormat, TextureUsages,
         },
         renderer::{RenderDevice, RenderQueue},
         texture::GpuImage,
@@ -20,9 +20,7 @@ use bevy::{
 };
 use bevy_cumulus::prelude::*;
 
-use crate::gpu::{
-    app_with, assert_shaders_compile, read_mapped, run_until, run_updates, webgpu_limits,
-};
+use crate::gpu::{app_with, assert_shaders_compile, read_mapped, run_until, run_updates, webgpu_limits};
 
 /// What is behind the clouds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -55,41 +53,19 @@ pub fn clouds_app() -> App {
 /// [`clouds_app`] with these plugins, of which [`CloudsPlugin`] must be one.
 pub fn clouds_app_with<M>(plugins: impl Plugins<M>) -> App {
     let mut app = app_with(plugins);
-    let unsupported = app
-        .world()
-        .resource::<CloudStatus>()
-        .unsupported()
-        .map(str::to_owned);
+    let unsupported = app.world().resource::<CloudStatus>().unsupported().map(str::to_owned);
     assert_eq!(unsupported, None, "clouds cannot be drawn on this device");
-    app.insert_resource(CloudTextures {
-        volume_size: 32,
-        map_size: 64,
-        ..default()
-    })
-    .insert_resource(CloudClock {
-        seconds: 0.0,
-        speed: 0.0,
-    })
-    .insert_resource(TimeUpdateStrategy::ManualDuration(
-        std::time::Duration::from_millis(16),
-    ));
+    app.insert_resource(CloudTextures { volume_size: 32, map_size: 64, ..default() })
+        .insert_resource(CloudClock { seconds: 0.0, speed: 0.0 })
+        .insert_resource(TimeUpdateStrategy::ManualDuration(std::time::Duration::from_millis(16)));
     app
 }
 
 /// Spawns a sun that shines along `light`, straight from outside the atmosphere.
 pub fn spawn_sun(app: &mut App, light: Vec3) -> Entity {
-    let sun = DirectionalLight {
-        illuminance: lux::RAW_SUNLIGHT,
-        ..default()
-    };
-    let up = if light.normalize().y.abs() > 0.99 {
-        Vec3::Z
-    } else {
-        Vec3::Y
-    };
-    app.world_mut()
-        .spawn((sun, Transform::default().looking_to(light, up)))
-        .id()
+    let sun = DirectionalLight { illuminance: lux::RAW_SUNLIGHT, ..default() };
+    let up = if light.normalize().y.abs() > 0.99 { Vec3::Z } else { Vec3::Y };
+    app.world_mut().spawn((sun, Transform::default().looking_to(light, up))).id()
 }
 
 /// Spawns a camera with clouds that draws into images of its own; with [`Sky::Atmosphere`] the first one brings the
@@ -104,10 +80,7 @@ pub fn spawn_view(app: &mut App, size: UVec2, transform: Transform, sky: Sky) ->
     let camera = world
         .spawn((
             Camera3d::default(),
-            Camera {
-                clear_color: ClearColorConfig::Custom(Color::BLACK),
-                ..default()
-            },
+            Camera { clear_color: ClearColorConfig::Custom(Color::BLACK), ..default() },
             RenderTarget::from(target.clone()),
             Exposure { ev100: 13.0 },
             Msaa::Off,
@@ -117,22 +90,13 @@ pub fn spawn_view(app: &mut App, size: UVec2, transform: Transform, sky: Sky) ->
         ))
         .id();
     if sky == Sky::Atmosphere && !webgpu_limits() {
-        world
-            .entity_mut(camera)
-            .insert(AtmosphereSettings::default());
+        world.entity_mut(camera).insert(AtmosphereSettings::default());
         if world.query::<&Atmosphere>().iter(world).next().is_none() {
-            let medium = world
-                .resource_mut::<Assets<ScatteringMedium>>()
-                .add(ScatteringMedium::earth(256, 256));
+            let medium = world.resource_mut::<Assets<ScatteringMedium>>().add(ScatteringMedium::earth(256, 256));
             world.spawn(Atmosphere::earth(medium));
         }
     }
-    View {
-        camera,
-        target,
-        clouds,
-        size,
-    }
+    View { camera, target, clouds, size }
 }
 
 /// Runs frames until clouds are drawn; fails if that takes more than 600, or if a shader does not compile.
@@ -146,10 +110,7 @@ pub fn until_drawn(app: &mut App) {
 /// The resolved clouds of the last frame, row by row from the top left: radiance (cd/m²) and transmittance.
 pub fn cloud_pixels(app: &App, view: &View) -> Vec<Vec4> {
     let bytes = read_image(app, &view.clouds);
-    bytemuck::pod_collect_to_vec::<u8, [f32; 4]>(&bytes)
-        .into_iter()
-        .map(Vec4::from_array)
-        .collect()
+    bytemuck::pod_collect_to_vec::<u8, [f32; 4]>(&bytes).into_iter().map(Vec4::from_array).collect()
 }
 
 /// The picture of the last frame as shown, row by row from the top left.
@@ -160,22 +121,9 @@ pub fn shown_pixels(app: &App, view: &View) -> Vec<[u8; 4]> {
 /// The texels of a 2D image on the GPU as they are now, rows tightly packed. It needs usage `COPY_SRC`.
 pub fn read_image(app: &App, image: &Handle<Image>) -> Vec<u8> {
     let world = app.sub_app(RenderApp).world();
-    let texture = &world
-        .resource::<RenderAssets<GpuImage>>()
-        .get(image)
-        .expect("the image is not on the GPU")
-        .texture;
-    assert!(
-        texture.usage().contains(TextureUsages::COPY_SRC),
-        "the image lacks the usage COPY_SRC"
-    );
-    let (size, texel) = (
-        texture.size(),
-        texture
-            .format()
-            .block_copy_size(None)
-            .expect("a format without a size"),
-    );
+    let texture = &world.resource::<RenderAssets<GpuImage>>().get(image).expect("the image is not on the GPU").texture;
+    assert!(texture.usage().contains(TextureUsages::COPY_SRC), "the image lacks the usage COPY_SRC");
+    let (size, texel) = (texture.size(), texture.format().block_copy_size(None).expect("a format without a size"));
     let packed = size.width * texel;
     let padded = RenderDevice::align_copy_bytes_per_row(packed as usize) as u32;
     let device = world.resource::<RenderDevice>();
@@ -186,25 +134,11 @@ pub fn read_image(app: &App, image: &Handle<Image>) -> Vec<u8> {
         mapped_at_creation: false,
     });
     let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
-    let layout = TexelCopyBufferLayout {
-        offset: 0,
-        bytes_per_row: Some(padded),
-        rows_per_image: None,
-    };
-    encoder.copy_texture_to_buffer(
-        texture.as_image_copy(),
-        TexelCopyBufferInfo {
-            buffer: &buffer,
-            layout,
-        },
-        size,
-    );
+    let layout = TexelCopyBufferLayout { offset: 0, bytes_per_row: Some(padded), rows_per_image: None };
+    encoder.copy_texture_to_buffer(texture.as_image_copy(), TexelCopyBufferInfo { buffer: &buffer, layout }, size);
     world.resource::<RenderQueue>().submit([encoder.finish()]);
     let rows: Vec<u8> = read_mapped(app, &buffer);
-    rows.chunks(padded as usize)
-        .flat_map(|row| &row[..packed as usize])
-        .copied()
-        .collect()
+    rows.chunks(padded as usize).flat_map(|row| &row[..packed as usize]).copied().collect()
 }
 
 #[test]
@@ -212,42 +146,23 @@ fn clouds_are_drawn_over_either_sky() {
     for sky in [Sky::Black, Sky::Atmosphere] {
         let mut app = clouds_app();
         spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
-        let looking =
-            Transform::from_xyz(0.0, 10.0, 0.0).looking_to(Vec3::new(0.0, 0.4, -1.0), Vec3::Y);
+        let looking = Transform::from_xyz(0.0, 10.0, 0.0).looking_to(Vec3::new(0.0, 0.4, -1.0), Vec3::Y);
         let view = spawn_view(&mut app, UVec2::new(65, 33), looking, sky);
         until_drawn(&mut app);
         run_updates(&mut app, 8);
         let pixels = cloud_pixels(&app, &view);
         assert_eq!(pixels.len(), (view.size.x * view.size.y) as usize);
-        assert!(
-            pixels
-                .iter()
-                .all(|p| p.is_finite() && p.min_element() >= 0.0 && p.w <= 1.0),
-            "{sky:?}"
-        );
-        let (clear, cloudy) = (
-            pixels.iter().filter(|p| p.w > 0.99),
-            pixels.iter().filter(|p| p.w < 0.5),
-        );
+        assert!(pixels.iter().all(|p| p.is_finite() && p.min_element() >= 0.0 && p.w <= 1.0), "{sky:?}");
+        let (clear, cloudy) = (pixels.iter().filter(|p| p.w > 0.99), pixels.iter().filter(|p| p.w < 0.5));
         let (clear, cloudy) = (clear.count(), cloudy.count());
-        assert!(
-            clear > 20 && cloudy > 20,
-            "{sky:?}: {clear} clear and {cloudy} cloudy pixels"
-        );
+        assert!(clear > 20 && cloudy > 20, "{sky:?}: {clear} clear and {cloudy} cloudy pixels");
         let shown = shown_pixels(&app, &view);
-        assert!(
-            shown.iter().filter(|p| p[0] > 40).count() >= 20,
-            "{sky:?}: nothing shines"
-        );
+        assert!(shown.iter().filter(|p| p[0] > 40).count() >= 20, "{sky:?}: nothing shines");
         // Down at the ground there is none.
         let down = looking.looking_to(Vec3::NEG_Y, Vec3::Z);
         app.world_mut().entity_mut(view.camera).insert(down);
         run_updates(&mut app, 8);
         let below = cloud_pixels(&app, &view);
-        assert!(
-            below.iter().all(|p| *p == Vec4::W),
-            "{sky:?}: {:?}",
-            below[0]
-        );
+        assert!(below.iter().all(|p| *p == Vec4::W), "{sky:?}: {:?}", below[0]);
     }
 }
