@@ -30,7 +30,6 @@
 //! | render | the passes of each camera with a [`CloudView`] |
 //!
 //! The plugin spawns nothing: the sun is the scene's brightest `DirectionalLight`, the sky its `Atmosphere`.
-#![forbid(unsafe_code)]
 #![warn(missing_docs)]
 
 #[cfg(feature = "inspector")]

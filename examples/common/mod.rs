@@ -245,7 +245,7 @@ pub fn spawn_sky(world: &mut World, sun: SunPose, sky: bool, shadows: bool) -> E
         ..default()
     };
     let light = DirectionalLight {
-        illuminance: if sky { lux::RAW_SUNLIGHT } else { lux::FULL_DAYLIGHT },
+        illuminance: if sky { lux::RAW_SUNLIGHT } else { lux::DIRECT_SUNLIGHT },
         shadow_maps_enabled: shadows,
         ..default()
     };

@@ -47,7 +47,7 @@ pub enum SettingsError {
         max: u32,
     },
     /// No field has this path.
-    #[error("no setting is called {0:?}; `--list` or `settable_paths` names them all")]
+    #[error("no setting is called {0:?}; `CloudSettings::paths` (`--list` in the examples) names them all")]
     UnknownPath(String),
     /// The text is not a value of the field's type.
     #[error("{field} = {value:?}: expected {expected}")]

@@ -185,7 +185,6 @@ impl Bakery {
 
 impl FromWorld for Bakery {
     fn from_world(world: &mut World) -> Self {
-        // Bevy does not re-export the enum, only values of it.
         let is_gpu =
             world.get_resource::<RenderAdapterInfo>().is_some_and(|info| info.device_type != wgpu::DeviceType::Cpu);
         let budget = TEXEL_OCTAVES_PER_FRAME * if is_gpu { GPU_FRAMES } else { 1 };
