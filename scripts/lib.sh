@@ -236,12 +236,69 @@ ensure_vulkan() {
     install_vulkan
 }
 
+# ---- windows ---------------------------------------------------------------------------------------------------------
+
+# What winit loads at run time, and so no linker names: library, and its Debian package.
+x_client=(libX11.so.6 libx11-6 libX11-xcb.so.1 libx11-xcb1 libXcursor.so.1 libxcursor1 libXi.so.6 libxi6
+    libXrandr.so.2 libxrandr2 libxkbcommon-x11.so.0 libxkbcommon-x11-0)
+
+# Adds to `packages` what the X client libraries that are not there come in.
+add_x_client() {
+    local i
+    for ((i = 0; i < ${#x_client[@]}; i += 2)); do
+        has_library "${x_client[i]}" || packages+=("${x_client[i + 1]}")
+    done
+}
+
+install_for() { # install_for WHAT PACKAGES...: nothing, where no package is named
+    local what=$1
+    shift
+    [ $# -gt 0 ] || return 0
+    lacks "$what" "$@" || return 0
+    say "installing $* for $what"
+    apt update
+    apt install "$@"
+}
+
+has_display() { # a screen that a window can open on
+    case "$(uname -s)" in
+        Darwin | MINGW* | MSYS*) [ -z "${SSH_CONNECTION:-}" ] && return ;;
+    esac
+    # The examples are built for X11. A Wayland desktop sets DISPLAY as well, for Xwayland.
+    case "${DISPLAY:-}" in
+        "") return 1 ;;
+        :*)
+            local number=${DISPLAY#:}
+            number=${number%%.*}
+            [ -S "/tmp/.X11-unix/X$number" ] || grep -q "@/tmp/.X11-unix/X$number\$" /proc/net/unix 2>/dev/null
+            ;;
+    esac
+}
+
+ensure_window() { # to open a window on the display that there is
+    case "$(uname -s)" in Darwin | MINGW* | MSYS*) return ;; esac
+    local packages=()
+    add_x_client
+    install_for "the window" ${packages[@]+"${packages[@]}"}
+}
+
+ensure_virtual_display() { # to open windows where there is no screen, and to press their keys
+    case "$(uname -s)" in Darwin | MINGW* | MSYS*) return ;; esac # the window tests are Linux's alone
+    local packages=()
+    has Xvfb || packages+=(xvfb)
+    has xdotool || packages+=(xdotool)
+    add_x_client
+    install_for "the window tests" ${packages[@]+"${packages[@]}"}
+}
+
 # ---- both scripts ----------------------------------------------------------------------------------------------------
 
-set_up() {
+set_up() { # set_up [ENSURE_...]: what every script needs, and what this one needs besides
     ensure_rust
     ensure_cc
     ensure_vulkan
+    local ensure
+    for ensure in "$@"; do "$ensure"; done
     if [ ${#missing[@]} -gt 0 ]; then
         printf 'missing (nothing was installed):\n' >&2
         printf '  %s\n' "${missing[@]}" >&2

@@ -53,8 +53,8 @@ use bevy::{
 pub use model::ModelShader;
 pub use render::{CloudBuffer, CloudFrame, CloudStatus};
 pub use settings::{
-    CloudClock, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures,
-    CloudView,
+    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
+    CloudTextures, CloudView,
 };
 
 /// What most users need.
@@ -62,8 +62,9 @@ pub mod prelude {
     pub use crate::{
         CloudBuffer, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
-            CloudTextures, CloudView, Erosion, Integration, MarchResolution, PhaseFunction, TemporalMode,
+            CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings,
+            CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution, PhaseFunction,
+            TemporalMode,
         },
     };
 }

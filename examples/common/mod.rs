@@ -4,6 +4,7 @@
 mod ground;
 mod hills;
 mod objects;
+mod thesis;
 
 use std::str::FromStr;
 
@@ -17,6 +18,7 @@ use bevy::{
     pbr::AtmosphereSettings,
     prelude::*,
 };
+use bevy_cumulus::prelude::*;
 use serde::Serialize;
 
 /// Radius of the planet (m): that of Bevy's `Atmosphere::earth`.
@@ -37,41 +39,60 @@ pub struct Scene {
     pub hills: bool,
     /// Added to the exposure that the sun's elevation asks for (EV, below 0 is brighter).
     pub ev_offset: f32,
+    /// Settings that differ from the preset's, by path.
+    pub settings: &'static [Setting],
+    /// The stage that is looked at.
+    pub debug: CloudDebugView,
+    /// Further settings of each picture of a strip; empty where there is one picture.
+    pub strip: &'static [&'static [Setting]],
 }
 
-/// All scenes. The ground, the sun and Bevy's atmosphere are in each.
-pub const SCENES: [Scene; 5] = [
+/// Path and value of a setting, as `CloudSettings::set` takes them.
+pub type Setting = (&'static str, &'static str);
+
+/// What scenes have unless they say otherwise.
+const EVERYDAY: Scene = Scene {
+    name: "",
+    preset: "FairWeather",
+    camera: CameraPose::new(0.0, 2.0, 0.0, 0.0, 16.0),
+    sun: SunPose::new(58.0, 130.0),
+    hills: false,
+    ev_offset: 0.0,
+    settings: &[],
+    debug: CloudDebugView::None,
+    strip: &[],
+};
+
+/// The everyday scenes. The ground, the sun and Bevy's atmosphere are in each.
+const SCENES: [Scene; 5] = [
     Scene {
         name: "ground_noon",
         preset: "FairWeather",
         camera: CameraPose::new(0.0, 2.0, 0.0, 0.0, 16.0),
         sun: SunPose::new(58.0, 130.0),
-        hills: false,
-        ev_offset: 0.0,
+        ..EVERYDAY
     },
     Scene {
         name: "ground_backlit",
         preset: "FairWeather",
         camera: CameraPose::new(0.0, 2.0, 0.0, 0.0, 22.0),
         sun: SunPose::new(32.0, -3.0),
-        hills: false,
-        ev_offset: 0.0,
+        ..EVERYDAY
     },
     Scene {
         name: "overcast",
         preset: "Overcast",
         camera: CameraPose::new(0.0, 2.0, 0.0, 0.0, 15.0),
         sun: SunPose::new(42.0, 40.0),
-        hills: false,
         ev_offset: -0.5,
+        ..EVERYDAY
     },
     Scene {
         name: "sunset",
         preset: "Sunset",
         camera: CameraPose::new(0.0, 2.0, 0.0, 0.0, 13.0),
         sun: SunPose::new(3.0, 12.0),
-        hills: false,
-        ev_offset: 0.0,
+        ..EVERYDAY
     },
     Scene {
         name: "hills",
@@ -79,7 +100,7 @@ pub const SCENES: [Scene; 5] = [
         camera: CameraPose::new(0.0, 420.0, 0.0, 0.0, 9.0),
         sun: SunPose::new(38.0, 115.0),
         hills: true,
-        ev_offset: 0.0,
+        ..EVERYDAY
     },
 ];
 
@@ -87,9 +108,14 @@ pub const SCENES: [Scene; 5] = [
 pub const PLAIN: Scene = Scene { name: "", ..SCENES[0] };
 
 impl Scene {
+    /// All scenes: the everyday ones, then the figures of the thesis.
+    pub fn all() -> impl Iterator<Item = Self> {
+        SCENES.into_iter().chain(thesis::FIGURES)
+    }
+
     /// The scene of this name, if there is one.
     pub fn named(name: &str) -> Option<Self> {
-        SCENES.into_iter().find(|scene| scene.name == name)
+        Self::all().find(|scene| scene.name == name)
     }
 }
 

@@ -6,7 +6,7 @@ use anyhow::{Context as _, Result, anyhow, bail};
 use bevy_cumulus::prelude::*;
 use clap::Args;
 
-use crate::common::{CameraPose, PLAIN, SCENES, Scene, SunPose};
+use crate::common::{CameraPose, PLAIN, Scene, Setting, SunPose};
 
 /// A scene sets defaults, every other option overrides them, and --set comes last.
 #[derive(Args, Debug)]
@@ -42,6 +42,9 @@ pub struct Start {
     pub named: Option<&'static str>,
     pub preset: String,
     pub settings: CloudSettings,
+    /// The settings of each picture of a strip; empty where there is one picture.
+    #[allow(dead_code, reason = "a window shows one picture")]
+    pub strip: Vec<CloudSettings>,
     pub camera: CameraPose,
     pub sun: SunPose,
     pub sky: bool,
@@ -59,7 +62,12 @@ impl StartOptions {
         let advised = preset.sun_elevation.filter(|_| named.is_none() && (unnamed.is_none() || self.preset.is_some()));
         let elevation = advised.unwrap_or(scene.sun.elevation);
         Ok(Start {
-            settings: self.settings(preset, clock)?,
+            strip: scene
+                .strip
+                .iter()
+                .map(|panel| self.settings(preset.clone(), clock.clone(), scene, panel))
+                .collect::<Result<_>>()?,
+            settings: self.settings(preset, clock, scene, &[])?,
             preset: preset_name.to_owned(),
             named: named.map(|scene| scene.name),
             camera: self.camera.unwrap_or(scene.camera),
@@ -69,7 +77,13 @@ impl StartOptions {
         })
     }
 
-    fn settings(&self, preset: CloudPreset, clock: CloudClock) -> Result<CloudSettings> {
+    fn settings(
+        &self,
+        preset: CloudPreset,
+        clock: CloudClock,
+        scene: Scene,
+        panel: &[Setting],
+    ) -> Result<CloudSettings> {
         let mut settings = CloudSettings {
             model: preset.model,
             lighting: preset.lighting,
@@ -79,6 +93,9 @@ impl StartOptions {
         };
         if let Some(quality) = self.quality.as_deref().and_then(CloudQuality::named) {
             settings.quality = quality;
+        }
+        for (path, value) in scene.settings.iter().chain(panel) {
+            settings.set(path, value).with_context(|| format!("scene {}", scene.name))?;
         }
         settings.validate().context("settings")?;
         for text in &self.sets {
@@ -94,7 +111,7 @@ impl StartOptions {
 
 fn find_scene(name: &str) -> Result<Scene> {
     Scene::named(name).ok_or_else(|| {
-        let known = SCENES.map(|scene| scene.name).join(", ");
+        let known = Scene::all().map(|scene| scene.name).collect::<Vec<_>>().join(", ");
         anyhow!("--scene {name:?}: no such scene; there are {known}")
     })
 }

@@ -108,7 +108,8 @@ fn setup(world: &mut World) {
         ..default()
     };
     let pose = (start.camera.transform(), start.camera.projection(16.0 / 9.0));
-    let camera = world.spawn((common::camera(ev100), CloudView::default(), Msaa::Off, flying, pose)).id();
+    let view = CloudView { debug: start.scene.debug, ..default() };
+    let camera = world.spawn((common::camera(ev100), view, Msaa::Off, flying, pose)).id();
     if start.sky {
         world.entity_mut(camera).insert(common::sky_camera());
     }

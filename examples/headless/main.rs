@@ -76,7 +76,7 @@ fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
 
 /// Prints the names of scenes, presets and settable paths, one a line.
 fn list() -> std::io::Result<()> {
-    let scenes = common::SCENES.iter().map(|scene| scene.name.to_owned());
+    let scenes = common::Scene::all().map(|scene| scene.name.to_owned());
     let presets = CloudPreset::names().map(str::to_owned);
     let mut out = std::io::stdout().lock();
     for name in scenes.chain(presets).chain(CloudSettings::default().paths()) {

@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Result, ensure};
 use bevy::math::Vec3;
 use bevy_cumulus::prelude::*;
 use clap::Parser;
@@ -24,7 +24,11 @@ pub struct Options {
     pub list: bool,
     #[command(flatten)]
     pub start: StartOptions,
-    /// Size of the picture in pixels, each side from 1 to 8192
+    /// Show one stage of the clouds instead: coverage_map, type_map, dimensional_profile, eroded_density,
+    /// single_scattering, multiple_scattering, no_phase, steps, transmittance, cloud_depth, single_frame, or none
+    #[arg(long, value_name = "NAME", value_parser = debug_view)]
+    pub debug: Option<CloudDebugView>,
+    /// Size of the picture in pixels, each side from 1 to 8192; of each picture, where a scene is a strip of some
     #[arg(long, value_name = "WxH", default_value = "480x270", value_parser = size)]
     pub size: (u32, u32),
     /// Frames rendered; the last one is kept
@@ -61,6 +65,13 @@ pub struct Options {
     pub timings: Option<PathBuf>,
 }
 
+fn debug_view(text: &str) -> Result<CloudDebugView, String> {
+    CloudDebugView::named(text).ok_or_else(|| {
+        let known = CloudDebugView::ALL.map(CloudDebugView::name).join(", ");
+        format!("no such debug view; there are {known}")
+    })
+}
+
 fn size(text: &str) -> Result<(u32, u32), String> {
     let side = |part: &str| part.parse().ok().filter(|n| (1..=8192).contains(n));
     let sides = text.split_once('x').and_then(|(w, h)| Some((side(w)?, side(h)?)));
@@ -84,6 +95,9 @@ pub struct Plan {
     named: Option<&'static str>,
     pub preset: String,
     pub settings: CloudSettings,
+    /// The settings of each picture of a strip, from left to right; empty where there is one picture.
+    pub strip: Vec<CloudSettings>,
+    pub debug: CloudDebugView,
     pub size: (u32, u32),
     pub frames: u32,
     pub sky: bool,
@@ -104,11 +118,27 @@ impl Options {
     pub fn plan(&self) -> Result<Plan> {
         // Runs must repeat, so real time does not move the clouds.
         let clock = CloudClock { seconds: self.time.unwrap_or(0.0), speed: 0.0 };
-        let Start { scene, named, preset, settings, camera, sun, sky } = self.start.start(None, clock)?;
+        let Start { scene, named, preset, settings, strip, camera, sun, sky } = self.start.start(None, clock)?;
+        if !strip.is_empty() {
+            let pictures = strip.len() as u32;
+            ensure!(
+                self.cloud.is_none() && self.timings.is_none(),
+                "--scene {}: a strip of {pictures} pictures has no single cloud buffer and no timings; leave --cloud and \
+                 --timings out",
+                scene.name
+            );
+            ensure!(
+                self.size.0 * pictures <= 65_536,
+                "--size: each of the strip's {pictures} pictures may be {} pixels wide",
+                65_536 / pictures
+            );
+        }
         Ok(Plan {
             scene,
             named,
             settings,
+            strip,
+            debug: self.debug.unwrap_or(scene.debug),
             preset,
             sky,
             camera,
@@ -177,6 +207,7 @@ impl Plan {
             sky: self.sky,
             msaa: self.msaa,
             ev100: self.ev100,
+            debug: self.debug.name(),
             scene: self.named,
             preset: &self.preset,
         }
@@ -201,6 +232,7 @@ pub struct Effective<'a> {
     sky: bool,
     msaa: u32,
     ev100: f32,
+    debug: String,
     scene: Option<&'static str>,
     preset: &'a str,
 }

@@ -56,9 +56,7 @@ struct Caught {
 /// Renders the plan.
 pub fn shoot(plan: &Plan) -> Result<Shot> {
     let mut studio = Studio::build(plan)?;
-    studio.make_ready(plan)?;
-    let timings = studio.count_frames(plan)?;
-    studio.shot(plan, timings)
+    if plan.strip.is_empty() { studio.picture(plan) } else { studio.strip(plan) }
 }
 
 struct Studio {
@@ -103,13 +101,7 @@ impl Studio {
     fn build(plan: &Plan) -> Result<Self> {
         let mut app = engine(plan);
         let world = app.world_mut();
-        let settings = plan.settings.clone();
-        world.insert_resource(settings.model);
-        world.insert_resource(settings.lighting);
-        world.insert_resource(settings.quality);
-        world.insert_resource(settings.textures);
-        // The clock is set before every frame instead, so it has no speed of its own.
-        world.insert_resource(CloudClock { speed: 0.0, ..settings.clock });
+        set(world, plan.strip.first().unwrap_or(&plan.settings));
 
         let (width, height) = plan.size;
         let limit = world.resource::<RenderDevice>().limits().max_texture_dimension_2d;
@@ -123,7 +115,11 @@ impl Studio {
         let wanted = plan.out.is_some() || plan.cloud.is_some();
         let buffer = wanted.then(|| images.add(CloudBuffer::image(width, height)));
         let camera = world
-            .spawn((common::camera(plan.ev100), CloudView::default(), RenderTarget::from(target.clone())))
+            .spawn((
+                common::camera(plan.ev100),
+                CloudView { debug: plan.debug, ..default() },
+                RenderTarget::from(target.clone()),
+            ))
             .insert(if plan.msaa == 4 { Msaa::Sample4 } else { Msaa::Off })
             .id();
         if plan.sky {
@@ -270,7 +266,29 @@ impl Studio {
         (plan.out.is_none() || caught.picture.is_some()) && (self.buffer.is_none() || caught.cloud.is_some())
     }
 
-    fn shot(mut self, plan: &Plan, timings: Timings) -> Result<Shot> {
+    fn picture(&mut self, plan: &Plan) -> Result<Shot> {
+        self.make_ready(plan)?;
+        let timings = self.count_frames(plan)?;
+        self.shot(plan, timings)
+    }
+
+    /// The pictures of a strip side by side.
+    fn strip(&mut self, plan: &Plan) -> Result<Shot> {
+        let (width, height) = plan.size;
+        let mut strip = RgbImage::new(width * plan.strip.len() as u32, height);
+        let mut last = None;
+        for (x, settings) in (0..).step_by(width as usize).zip(&plan.strip) {
+            set(self.app.world_mut(), settings);
+            let mut shot = self.picture(plan)?;
+            let picture = shot.picture.take().ok_or_else(|| anyhow!("--out: no picture came back"))?;
+            image::imageops::replace(&mut strip, &picture, x, 0);
+            last = Some(shot);
+        }
+        let last = last.ok_or_else(|| anyhow!("the strip has no picture"))?;
+        Ok(Shot { picture: Some(strip), ..last })
+    }
+
+    fn shot(&mut self, plan: &Plan, timings: Timings) -> Result<Shot> {
         let world = self.app.world_mut();
         let caught = std::mem::take(&mut *world.resource_mut::<Caught>());
         let picture = caught.picture.map(Image::try_into_dynamic).transpose();
@@ -280,6 +298,17 @@ impl Studio {
         let adapter = format!("{} ({:?})", info.name, info.backend);
         Ok(Shot { picture: picture.map(|picture| picture.to_rgb8()), cloud, timings, adapter })
     }
+}
+
+/// Puts the settings in place.
+fn set(world: &mut World, settings: &CloudSettings) {
+    let settings = settings.clone();
+    world.insert_resource(settings.model);
+    world.insert_resource(settings.lighting);
+    world.insert_resource(settings.quality);
+    world.insert_resource(settings.textures);
+    // The clock is set before every frame instead, so it has no speed of its own.
+    world.insert_resource(CloudClock { speed: 0.0, ..settings.clock });
 }
 
 /// The image in a texture's bytes, whose rows are padded to a multiple of 256.

@@ -11,6 +11,7 @@
 //! |---|---|
 //! | Preset | the built-in skies; loading and saving `*.clouds.ron` |
 //! | Modelling | [`CloudModel`](crate::CloudModel), [`CloudTextures`](crate::CloudTextures), the texture slots |
+//! | (a box) | [`CloudDebugView`](crate::CloudDebugView) of all cameras |
 //! | Rendering | [`CloudLighting`](crate::CloudLighting) |
 //! | Sampling | [`CloudQuality`](crate::CloudQuality) and its presets |
 //! | Clock | [`CloudClock`](crate::CloudClock) |

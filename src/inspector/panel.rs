@@ -19,14 +19,16 @@ use super::{
 use crate::{
     CloudStatus,
     settings::{
-        CloudClock, CloudLighting, CloudModel, CloudQuality, CloudTextureSlots, CloudTextures, SettingsError, Validate,
+        CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudQuality, CloudTextureSlots, CloudTextures,
+        CloudView, SettingsError, Validate,
     },
     textures::{CloudTextureError, CloudTextureStatus},
 };
 
 /// Everything the panel reads and writes.
 #[derive(SystemParam)]
-pub(super) struct Shown<'w> {
+pub(super) struct Shown<'w, 's> {
+    views: Query<'w, 's, &'static mut CloudView>,
     model: Option<ResMut<'w, CloudModel>>,
     lighting: Option<ResMut<'w, CloudLighting>>,
     quality: Option<ResMut<'w, CloudQuality>>,
@@ -90,6 +92,7 @@ fn panel(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {
         });
         part(ui, "Your own textures", false, |ui| slots_ui(ui, shown, state));
     });
+    debug_view_ui(ui, shown);
     part(ui, "Rendering", false, |ui| state.lighting.ui(ui, shown.lighting.as_mut(), When::AtOnce));
     part(ui, "Sampling", false, |ui| {
         quality_presets_ui(ui, shown.quality.as_mut());
@@ -114,6 +117,31 @@ fn presets_ui(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {
         lighting.set_if_neq(preset.lighting);
         textures.set_if_neq(preset.textures);
     }
+}
+
+/// A choice of the stage that all cameras show; that of the first is shown as chosen.
+fn debug_view_ui(ui: &mut Ui, shown: &mut Shown) {
+    let Some(now) = shown.views.iter().map(|view| view.debug).next() else { return };
+    if let Some(chosen) = choose_debug_view(ui, now) {
+        for mut view in &mut shown.views {
+            // Without a change nothing is touched: change detection stays right.
+            if view.debug != chosen {
+                view.debug = chosen;
+            }
+        }
+    }
+}
+
+/// The box alone. What was chosen, if something else than `now`.
+pub(super) fn choose_debug_view(ui: &mut Ui, now: CloudDebugView) -> Option<CloudDebugView> {
+    let mut chosen = now;
+    let words = |view: CloudDebugView| view.name().replace('_', " ");
+    egui::ComboBox::from_label("stage shown alone").selected_text(words(now)).show_ui(ui, |ui| {
+        for view in CloudDebugView::ALL {
+            ui.selectable_value(&mut chosen, view, words(view));
+        }
+    });
+    (chosen != now).then_some(chosen)
 }
 
 fn slots_ui(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {

@@ -128,3 +128,25 @@ fn looking_at_a_setting_does_not_change_it() {
 fn quality_names_are_known() {
     assert!(QUALITIES.iter().all(|name| CloudQuality::named(name).is_some()));
 }
+
+#[test]
+fn a_debug_view_is_chosen_from_its_box() {
+    let (mut screen, mut now) = (Screen::new(), CloudDebugView::None);
+    let mut changed = 0;
+    let mut draw = |screen: &mut Screen, events| {
+        screen.frame(events, |ui| {
+            if let Some(chosen) = choose_debug_view(ui, now) {
+                now = chosen;
+                changed += 1;
+            }
+        })
+    };
+    let mut texts = draw(&mut screen, vec![]);
+    for choice in ["none", "type map"] {
+        // The list takes a frame to be measured and one to be drawn.
+        for events in click(find(&texts, choice)).into_iter().chain([vec![], vec![]]) {
+            texts = draw(&mut screen, events);
+        }
+    }
+    assert_eq!((now, changed), (CloudDebugView::TypeMap, 1));
+}

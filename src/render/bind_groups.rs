@@ -170,8 +170,17 @@ fn view_bind_groups(
     });
     let multisampled = *item.msaa != Msaa::Off;
     let ms = usize::from(multisampled);
-    let variant = Variant { atmosphere: air.is_some(), multisampled, target: item.view.target_format };
+    let variant = Variant {
+        atmosphere: air.is_some(),
+        multisampled,
+        target: item.view.target_format,
+        debug: item.cloud.debug.shader(),
+    };
     let ids = pipelines.get(cache, model, variant);
+    // All stages or none: a composite without a march would blend what nobody has written.
+    if !ids.drawable(cache) {
+        return None;
+    }
     let empty = device.create_bind_group("cloud_empty", &layout(&pipelines.empty), &[]);
     let (air, air_offsets) = air.unwrap_or_else(|| (empty.clone(), Vec::new()));
     let frame = item.uniforms.frame.binding()?;
@@ -214,7 +223,7 @@ fn view_bind_groups(
                 &BindGroupEntries::sequential((frame.clone(), sky_light.as_entire_binding(), world_from_local)),
             ),
         ),
-        march: (ids.march, march),
+        march: (ids.drawable_march(cache), march),
         accumulate: (
             ids.accumulate,
             group(

@@ -6,7 +6,7 @@ use super::history::FrameInWindow;
 use crate::{
     model::TangentFrame,
     reference::phase::Phase,
-    settings::{CloudLighting, CloudQuality, Integration},
+    settings::{CloudDebugView, CloudLighting, CloudQuality, Integration},
     textures::n_rooks::n_rooks,
 };
 
@@ -32,6 +32,7 @@ pub(crate) struct FrameInput<'a> {
     pub quality: &'a CloudQuality,
     pub lighting: &'a CloudLighting,
     pub window: FrameInWindow,
+    pub debug: CloudDebugView,
 }
 
 /// `CloudFrame` of `frame.wesl`, field for field.
@@ -57,6 +58,7 @@ pub(crate) struct FrameUniform {
     counts: UVec4,
     flags: UVec4,
     layers: UVec4,
+    debug: UVec4,
 }
 
 /// Marched size of a viewport.
@@ -132,6 +134,7 @@ impl FrameUniform {
                 quality.offsets.into(),
             ),
             layers: UVec4::new(window.layer(), window.leaving_layer(), window.layers(), window.held_before),
+            debug: UVec4::new(input.debug.shader_mode(), 0, 0, 0),
         }
     }
 }

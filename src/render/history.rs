@@ -50,6 +50,7 @@ pub(crate) struct HistoryKey {
     pub settings: u64,
     pub textures: u64,
     pub quality: crate::settings::CloudQuality,
+    pub debug: crate::settings::CloudDebugView,
     pub atmosphere: bool,
     pub msaa: u32,
 }

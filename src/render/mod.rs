@@ -16,7 +16,7 @@ use bevy::{
         schedule::{Core3d, Core3dSystems},
     },
     prelude::*,
-    render::{GpuResourceAppExt, Render, RenderSystems},
+    render::{GpuResourceAppExt, Render, RenderStartup, RenderSystems},
     shader::load_shader_library,
 };
 
@@ -36,6 +36,7 @@ impl Plugin for CloudRenderPlugin {
         load_shader_library!(app, "march/integrate.wesl");
         load_shader_library!(app, "march/lighting.wesl");
         load_shader_library!(app, "march/aerial.wesl");
+        load_shader_library!(app, "march/debug.wesl");
         load_shader_library!(app, "composite/upsample.wesl");
         load_shader_library!(app, "sky/sky.wesl");
         embedded_asset!(app, "march/march.wesl");
@@ -52,6 +53,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
         .init_resource::<view::ExtractedClouds>()
         .init_gpu_resource::<ModelBindings>()
         .init_gpu_resource::<pipelines::CloudPipelines>()
+        .add_systems(RenderStartup, view::forget_lost_device)
         .add_systems(ExtractSchedule, (view::extract_settings, view::extract_views))
         .add_systems(
             Render,

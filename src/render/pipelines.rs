@@ -15,7 +15,7 @@ use bevy::{
 };
 
 use super::frame::FrameUniform;
-use crate::model::ModelBindings;
+use crate::{model::ModelBindings, settings::DebugShader};
 
 /// What a stage's pipeline depends on.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -23,6 +23,20 @@ pub(crate) struct Variant {
     pub atmosphere: bool,
     pub multisampled: bool,
     pub target: TextureFormat,
+    pub debug: DebugShader,
+}
+
+impl Variant {
+    /// What its shaders are compiled with.
+    fn definitions(self) -> Vec<bevy::shader::ShaderDefVal> {
+        let all = [
+            ("ATMOSPHERE", self.atmosphere),
+            ("MULTISAMPLED", self.multisampled),
+            ("DEBUG_VIEW", self.debug != DebugShader::None),
+            ("DEBUG_MAP", self.debug == DebugShader::Map),
+        ];
+        all.into_iter().filter(|(_, on)| *on).map(|(name, _)| name.into()).collect()
+    }
 }
 
 /// Pipelines of one variant.
@@ -30,6 +44,8 @@ pub(crate) struct Variant {
 pub(crate) struct Pipelines {
     pub sky: CachedComputePipelineId,
     pub march: CachedComputePipelineId,
+    /// The march of finished clouds, shown while a debug view's own is not compiled.
+    pub plain_march: CachedComputePipelineId,
     pub accumulate: CachedComputePipelineId,
     pub composite: CachedRenderPipelineId,
     pub publish: CachedComputePipelineId,
@@ -160,13 +176,10 @@ impl CloudPipelines {
         if let Some(made) = self.made.get(&variant) {
             return *made;
         }
-        let mut defs: Vec<bevy::shader::ShaderDefVal> = Vec::new();
-        if variant.atmosphere {
-            defs.push("ATMOSPHERE".into());
-        }
-        if variant.multisampled {
-            defs.push("MULTISAMPLED".into());
-        }
+        // A debug view shares all but the march with the normal variant.
+        let plain = (variant.debug != DebugShader::None)
+            .then(|| self.get(cache, model, Variant { debug: DebugShader::None, ..variant }));
+        let defs = variant.definitions();
         let ms = usize::from(variant.multisampled);
         let air = if variant.atmosphere { &self.air } else { &self.empty };
         let compute = |label: &'static str, shader: usize, layout: [&BindGroupLayoutDescriptor; 3]| {
@@ -179,6 +192,12 @@ impl CloudPipelines {
                 ..default()
             })
         };
+        if let Some(plain) = plain {
+            let march = compute("cloud_march", 1, [air, &model.layout, &self.march[ms]]);
+            let made = Pipelines { march, ..plain };
+            self.made.insert(variant, made);
+            return made;
+        }
         let premultiplied = BlendState {
             color: BlendComponent {
                 src_factor: BlendFactor::One,
@@ -208,9 +227,11 @@ impl CloudPipelines {
             }),
             ..default()
         });
+        let march = compute("cloud_march", 1, [air, &model.layout, &self.march[ms]]);
         let made = Pipelines {
             sky: compute("cloud_sky", 0, [air, &self.empty, &self.sky]),
-            march: compute("cloud_march", 1, [air, &model.layout, &self.march[ms]]),
+            march,
+            plain_march: march,
             accumulate: compute("cloud_accumulate", 2, [&self.empty, &self.empty, &self.accumulate]),
             composite,
             publish: compute("cloud_publish", 4, [&self.empty, &self.empty, &self.publish[ms]]),
@@ -221,9 +242,21 @@ impl CloudPipelines {
 }
 
 impl Pipelines {
-    /// Whether all are compiled.
-    pub fn ready(self, cache: &PipelineCache) -> bool {
-        [self.sky, self.march, self.accumulate, self.publish].iter().all(|id| cache.get_compute_pipeline(*id).is_some())
+    /// The march, or that of finished clouds until it is compiled: without any, the window would fill with nothing.
+    pub fn drawable_march(self, cache: &PipelineCache) -> CachedComputePipelineId {
+        if cache.get_compute_pipeline(self.march).is_some() { self.march } else { self.plain_march }
+    }
+
+    /// Whether a picture can be drawn: every stage is compiled, be the march that of finished clouds.
+    pub fn drawable(self, cache: &PipelineCache) -> bool {
+        [self.sky, self.drawable_march(cache), self.accumulate, self.publish]
+            .iter()
+            .all(|id| cache.get_compute_pipeline(*id).is_some())
             && cache.get_render_pipeline(self.composite).is_some()
+    }
+
+    /// Whether it is the picture that was asked for.
+    pub fn ready(self, cache: &PipelineCache) -> bool {
+        self.drawable(cache) && cache.get_compute_pipeline(self.march).is_some()
     }
 }

@@ -22,7 +22,9 @@ use super::{
 };
 use crate::{
     model::{ModelUniform, TangentFrame, TexelSizes},
-    settings::{CloudQuality, CloudSettings, CloudView, GoodSettings, Validate},
+    settings::{
+        CloudDebugView, CloudLighting, CloudModel, CloudQuality, CloudSettings, CloudView, GoodSettings, Validate,
+    },
     textures::CloudTextureViews,
 };
 
@@ -42,6 +44,7 @@ pub(crate) struct ExtractedClouds {
 pub(crate) struct ExtractedCloudView {
     quality: CloudQuality,
     reset: u32,
+    pub debug: CloudDebugView,
     pub buffer: Option<AssetId<Image>>,
     pub frame: Option<AssetId<Image>>,
 }
@@ -64,6 +67,13 @@ type CameraItems = (
 
 /// What a view has of ours while it shows clouds.
 type Ours = (ExtractedCloudView, CloudUniforms, CloudHistory, CloudBindGroups, SkyLightBuffer);
+
+/// Runs with every new device: what views hold belongs to the one that was lost.
+pub(crate) fn forget_lost_device(mut commands: Commands, views: Query<Entity, With<ExtractedCloudView>>) {
+    for view in &views {
+        commands.entity(view).remove::<Ours>();
+    }
+}
 
 pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut<ExtractedClouds>) {
     out.settings.clock.clone_from(&good.0.clock);
@@ -99,9 +109,11 @@ pub(crate) fn extract_views(
                 }
             }
         }
+        view.debug.change_quality(&mut quality);
         commands.entity(entity).insert(ExtractedCloudView {
             quality,
             reset: view.reset,
+            debug: view.debug,
             buffer: buffer.map(|b| b.0.id()),
             frame: frame.map(|f| f.0.id()),
         });
@@ -193,6 +205,7 @@ pub(crate) fn prepare_views(
             }
             None => first.insert(CloudHistory::new(&device, key, pose)).frame,
         };
+        let (model, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
             world_from_view: pose.rotation,
@@ -201,10 +214,11 @@ pub(crate) fn prepare_views(
             sun,
             exposure: item.camera.exposure,
             quality: &item.cloud.quality,
-            lighting: &clouds.settings.lighting,
+            lighting: &lighting,
             window,
+            debug: item.cloud.debug,
         });
-        let model = ModelUniform::new(&clouds.settings.model, clouds.settings.clock.seconds, &space, sizes);
+        let model = ModelUniform::new(&model, clouds.settings.clock.seconds, &space, sizes);
         let world_from_local = Mat4::from_quat(space.local_from_world.inverse().as_quat());
         let mut own = None;
         let uniforms = match &mut item.uniforms {
@@ -225,6 +239,14 @@ pub(crate) fn prepare_views(
             entity.insert(uniforms);
         }
     }
+}
+
+/// The settings with a debug view's changes made to them.
+fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLighting) {
+    let (mut model, mut lighting) = (settings.model.clone(), settings.lighting.clone());
+    debug.change_model(&mut model);
+    debug.change_lighting(&mut lighting);
+    (model, lighting)
 }
 
 /// The tangent frame under a view: planet centre from the scene's atmosphere, else a radius below the world's origin.
@@ -262,6 +284,7 @@ fn window_state(
         settings: clouds.version,
         textures: textures.generation,
         quality: quality.clone(),
+        debug: item.cloud.debug,
         atmosphere: item.atmosphere.is_some(),
         msaa: item.msaa.samples(),
     };

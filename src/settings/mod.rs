@@ -1,6 +1,7 @@
 //! What a user sets. One file per resource; every field says meaning, unit, range, default and cost.
 
 mod check;
+mod debug;
 mod lighting;
 mod model;
 mod paths;
@@ -12,6 +13,8 @@ mod view;
 use bevy::prelude::*;
 
 pub use check::{SettingsError, Validate};
+pub use debug::CloudDebugView;
+pub(crate) use debug::DebugShader;
 pub use lighting::{CloudLighting, PhaseFunction};
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
@@ -43,6 +46,7 @@ impl Plugin for CloudSettingsPlugin {
             .register_type::<CloudTextureSlots>()
             .register_type::<CloudClock>()
             .register_type::<CloudView>()
+            .register_type::<CloudDebugView>()
             .register_type::<CloudPreset>()
             .init_asset::<CloudPreset>()
             .init_asset_loader::<preset::CloudPresetLoader>()

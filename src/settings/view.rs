@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{CloudQuality, Validate};
+use super::{CloudDebugView, CloudQuality, Validate};
 
 /// Draws clouds in this camera's view. Opt-in, like `Bloom`; the camera needs a perspective projection.
 ///
@@ -19,11 +19,13 @@ pub struct CloudView {
     pub quality: Option<CloudQuality>,
     /// Change it (add 1) to drop the view's history, as on a camera cut. Default 0.
     pub reset: u32,
+    /// A stage to look at alone. Default [`CloudDebugView::None`], which costs nothing.
+    pub debug: CloudDebugView,
 }
 
 impl Default for CloudView {
     fn default() -> Self {
-        Self { enabled: true, quality: None, reset: 0 }
+        Self { enabled: true, quality: None, reset: 0, debug: CloudDebugView::None }
     }
 }
 

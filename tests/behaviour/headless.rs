@@ -86,16 +86,74 @@ static WRITTEN: LazyLock<Folder> = LazyLock::new(|| {
     render(&[SHOT, &["--scene", "ground_noon", "--out", "shot.png", "--timings", "timings.json"]].concat())
 });
 
+/// Scenes of the thesis's figures.
+pub const FIGURES: [&str; 18] = [
+    "thesis_coverage",
+    "thesis_type",
+    "thesis_profile",
+    "thesis_eroded",
+    "thesis_single",
+    "thesis_multiple",
+    "thesis_ambient",
+    "thesis_phase_day",
+    "thesis_phase_day_off",
+    "thesis_phase_sunset",
+    "thesis_phase_sunset_off",
+    "thesis_coverage_sweep",
+    "thesis_aliasing_off",
+    "thesis_aliasing_blue_noise",
+    "thesis_integration_naive",
+    "thesis_integration",
+    "thesis_window_8m",
+    "thesis_window_80m",
+];
+
+#[test]
+fn every_figure_can_be_started() {
+    // A mistake in a scene's settings is found before the file is looked at.
+    let folder = Folder::new();
+    for figure in FIGURES {
+        let output = run_in(&folder, &["--scene", figure, "--out", "nowhere/shot.png"]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(said.contains("--out") && said.contains("nowhere"), "{figure}: {said}");
+    }
+}
+
+#[test]
+fn a_strip_has_its_pictures_side_by_side() {
+    let files = ["--scene", "thesis_coverage_sweep", "--size", "32x18", "--frames", "1", "--out", "strip.png"];
+    let strip = read(&render(&files).join("strip.png")).to_rgb8();
+    assert_eq!(strip.dimensions(), (5 * 32, 18));
+    let panel = |k: u32| image::imageops::crop_imm(&strip, 32 * k, 0, 32, 18).to_image();
+    for k in 0..4 {
+        assert!(panel(k) != panel(k + 1), "pictures {k} and {} are the same", k + 1);
+    }
+    // More cloud hides more of the blue.
+    let blue = |k| panel(k).pixels().map(|p| i64::from(p[2]) - i64::from(p[0])).sum::<i64>();
+    assert!(blue(0) > 2 * blue(4).max(1), "{} and {}", blue(0), blue(4));
+}
+
+#[test]
+fn a_debug_view_changes_the_picture() {
+    let alone = ["--size", "32x18", "--frames", "1", "--camera", "0,2,0,0,40", "--out", "shot.png"];
+    let shot = |debug| read(&render(&[&alone[..], &["--debug", debug]].concat()).join("shot.png")).to_rgb8();
+    assert!(shot("none") != shot("coverage_map"));
+    let grey = |p: &image::Rgb<u8>| p.0.iter().max().unwrap_or(&0) - p.0.iter().min().unwrap_or(&0) <= 6;
+    let map = shot("coverage_map");
+    assert!(map.pixels().all(grey), "the map is grey all over");
+}
+
 #[test]
 fn list_prints_scenes_presets_and_paths_one_a_line() {
     let output = run_in(&Folder::new(), &["--list"]);
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).expect("the list is text");
     let lines: BTreeSet<&str> = text.lines().collect();
-    let scenes = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills"].map(str::to_owned);
+    let everyday = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills"];
+    let scenes = everyday.into_iter().chain(FIGURES).map(str::to_owned);
     let paths = CloudSettings::default().paths();
     assert!(paths.contains(&"model.coverage".to_owned()));
-    let wanted = scenes.into_iter().chain(CloudPreset::names().map(str::to_owned)).chain(paths);
+    let wanted = scenes.chain(CloudPreset::names().map(str::to_owned)).chain(paths);
     assert_eq!(lines, wanted.collect::<Vec<_>>().iter().map(String::as_str).collect());
 }
 
@@ -111,6 +169,8 @@ fn mistakes_are_named_and_nothing_is_written() {
         (&["--set", "model.coverage=NaN"], &["model.coverage"]),
         (&["--set", "model.top=100"], &["model.top", "model.bottom"]),
         (&["--set", "model.coverage"], &["PATH=VALUE"]),
+        (&["--debug", "xray"], &["--debug", "xray", "coverage_map"]),
+        (&["--scene", "thesis_coverage_sweep"], &["thesis_coverage_sweep", "strip", "--cloud"]),
         (&["--quality", "best"], &["--quality", "best", "ultra"]),
         (&["--size", "0x36"], &["--size", "0x36", "8192"]),
         (&["--size", "64x8193"], &["--size", "64x8193"]),

@@ -4,6 +4,7 @@
 mod bad_input;
 mod bound;
 mod cameras;
+mod debug_views;
 mod drift;
 mod goldens;
 mod gpu;
@@ -22,3 +23,5 @@ mod textures;
 mod twins;
 mod view;
 mod window;
+#[cfg(target_os = "linux")]
+mod window_driven;

@@ -208,7 +208,12 @@ fn settings_are_read_back_as_written() {
         round_trip(&settings.quality);
         round_trip(&settings.textures);
         round_trip(&settings.clock);
-        round_trip(&CloudView { enabled: false, quality: Some(settings.quality), reset: 7 });
+        round_trip(&CloudView {
+            enabled: false,
+            quality: Some(settings.quality),
+            reset: 7,
+            debug: CloudDebugView::Steps,
+        });
         round_trip(&CloudPreset {
             model: settings.model,
             lighting: settings.lighting,

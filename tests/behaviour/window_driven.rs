@@ -1,0 +1,210 @@
+//! The windowed examples, driven as a hand drives them: a real window on a virtual X server, keys, a dragged slider.
+//!
+//! What must come is waited for. There is no window manager, so that a window lies where the test says, at 0, 0.
+
+mod screen;
+
+use std::{
+    thread::sleep,
+    time::{Duration, Instant},
+};
+
+use bevy_cumulus::settings::CloudPreset;
+
+use crate::gpu::webgpu_limits;
+use screen::{PATIENCE, Part, Picture, SCREEN, Screen, wait};
+
+// Where things are in a window of 640 by 270, without help and panel.
+/// Above the haze, which is grey as clouds are.
+const SKY: Part = [0, 0, 230, 120];
+const HELP: Part = [10, 10, 230, 190];
+const PANEL: Part = [250, 170, 610, 260];
+const FILE: [usize; 2] = [350, 92];
+const LOAD: [usize; 2] = [461, 92];
+const SAVE: [usize; 2] = [504, 92];
+/// On the slider's rail, whose right end is full cover, once a line below the text box says what was saved.
+const COVERAGE: [usize; 2] = [430, 216];
+
+/// Flies over flat ground, with textures that are baked in no time; in the picture that it returns are clouds.
+fn fly(more: &[&str]) -> (Screen, Picture) {
+    let quick = ["--size", "640x270", "--bare", "--scene", "ground_noon", "--quality", "low"];
+    let small = ["--set", "textures.volume_size=32", "--set", "textures.map_size=128"];
+    let mut screen = Screen::show("fly_camera", "bevy_cumulus", &[&quick[..], &small, more].concat());
+    // The pointer rests where it touches nothing.
+    screen.act(&["mousemove", "100", "250"]);
+    let clouds = screen.wait_for("clouds", |now| (0.05..0.9).contains(&now.grey(SKY)));
+    (screen, clouds)
+}
+
+/// Under WebGPU's limits Bevy's `Atmosphere`, which both examples have, fails validation; nothing here differs between
+/// the two runs of scripts/test, so the ordinary one does for both.
+fn in_the_other_run() -> bool {
+    webgpu_limits()
+}
+
+#[test]
+fn keys_change_the_sky() {
+    if in_the_other_run() {
+        return;
+    }
+    let (mut screen, day) = fly(&["--sun", "15,90"]);
+    let clouds = day.grey(SKY);
+    screen.hold_until(&["c"], "C to bring cloud", |now| now.grey(SKY) > clouds + 0.15);
+    screen.hold_until(&["shift", "c"], "Shift C to take it away", |now| now.grey(SKY) < clouds);
+
+    let day = screen.picture().brightness(SKY);
+    screen.hold_until(&["shift", "t"], "Shift T to bring the night", |now| now.brightness(SKY) < 0.6 * day);
+    screen.hold_until(&["t"], "T to bring the day", |now| now.brightness(SKY) > 0.9 * day);
+
+    let plain = screen.picture().brightness(HELP);
+    screen.act(&["key", "h"]);
+    screen.wait_for("H to show the help", |now| now.brightness(HELP) < plain - 20.0);
+    screen.act(&["key", "h"]);
+    screen.wait_for("H to hide it", |now| now.brightness(HELP) > plain - 10.0);
+
+    let before = screen.picture();
+    screen.hold_until(&["d"], "D to fly", |now| now.differs(&before, SKY) > 8.0);
+    let before = screen.picture();
+    screen.press("p", SKY);
+    screen.wait_for("P to bring another preset", |now| now.differs(&before, SKY) > 8.0);
+}
+
+/// Waits until this part stays as it is: an animation has ended.
+fn still(screen: &mut Screen, part: Part) {
+    let (mut last, mut times) = (screen.picture(), 0);
+    screen.wait_for(&format!("{part:?} to stay as it is"), |now| {
+        sleep(Duration::from_millis(200));
+        times = if now.differs(&last, part) == 0.0 { times + 1 } else { 0 };
+        last = now.clone();
+        times == 3
+    });
+}
+
+/// Folds a group of the panel, or unfolds it.
+fn fold(screen: &mut Screen, title: [usize; 2]) {
+    let before = screen.picture();
+    let mut clicked = None::<Instant>;
+    wait("a group to fold", PATIENCE, || {
+        screen.check();
+        if clicked.is_none_or(|last| last.elapsed() > Duration::from_secs(10)) {
+            screen.click(title);
+            clicked = Some(Instant::now());
+        }
+        // More than the scroll bar.
+        (screen.picture().differs(&before, PANEL) > 1.0).then_some(())
+    });
+    // The clock's numbers run; an animation ends.
+    sleep(Duration::from_millis(700));
+}
+
+#[test]
+fn keys_change_quality_and_clock_as_the_panel_shows() {
+    if in_the_other_run() {
+        return;
+    }
+    let (mut screen, _) = fly(&[]);
+    screen.act(&["key", "i"]);
+    screen.wait_for("I to open the panel", |now| now.brightness(PANEL) < 60.0);
+    // Folded, each group's title is 21 pixels below the one before; between the second and the third is one more row.
+    let [preset, modelling, sampling, clock] = [0, 1, 4, 5].map(|row| [275, 50 + 21 * row]);
+    [preset, modelling, sampling].into_iter().for_each(|group| fold(&mut screen, group));
+    for key in ["2", "3", "4", "1"] {
+        screen.press(key, PANEL);
+        still(&mut screen, PANEL);
+    }
+    [sampling, clock].into_iter().for_each(|group| fold(&mut screen, group));
+    screen.act(&["mousemove", "100", "250"]);
+    // It shows the clock's seconds, which run.
+    let before = screen.picture();
+    screen.wait_for("the clock to run", |now| now.differs(&before, PANEL) > 0.0);
+    screen.act(&["key", "space"]);
+    still(&mut screen, PANEL);
+    screen.press("n", PANEL);
+    still(&mut screen, PANEL);
+    screen.act(&["key", "i"]);
+    screen.wait_for("I to close the panel", |now| now.brightness(PANEL) > 60.0);
+}
+
+/// Puts a name into the panel's text box and presses a button, as often as it takes: what is typed before the box has
+/// the keyboard is lost, and only a picture would tell.
+fn with_file<T>(screen: &mut Screen, name: &str, button: [usize; 2], mut done: impl FnMut(&Screen) -> Option<T>) -> T {
+    let mut tried = None::<Instant>;
+    let what = format!("the panel to save or load {name}");
+    wait(&what, PATIENCE, || {
+        screen.check();
+        if tried.is_none_or(|last| last.elapsed() > Duration::from_secs(5)) {
+            screen.click(FILE);
+            screen.act(&["sleep", "0.5", "key", "End"]);
+            screen.act(&[&["key"], &["BackSpace"; 40][..]].concat());
+            screen.act(&["type", name]);
+            screen.act(&["sleep", "0.3"]);
+            screen.click(button);
+            tried = Some(Instant::now());
+        }
+        done(screen)
+    })
+}
+
+/// Saves what the panel shows, through the panel.
+fn save(screen: &mut Screen, name: &str) -> CloudPreset {
+    with_file(screen, name, SAVE, |screen| CloudPreset::read(&screen.folder.join(name)).ok())
+}
+
+#[test]
+fn a_dragged_slider_changes_the_clouds_and_a_saved_preset_loads_back() {
+    if in_the_other_run() {
+        return;
+    }
+    let (mut screen, clouds) = fly(&[]);
+    screen.act(&["key", "i"]);
+    screen.wait_for("I to open the panel", |now| now.brightness(PANEL) < 60.0);
+    let before = save(&mut screen, "before.clouds.ron");
+
+    let few = clouds.grey(SKY);
+    let [x, y] = COVERAGE.map(|v| v.to_string());
+    screen.act(&["mousemove", &x, &y, "sleep", "0.5", "mousedown", "1", "sleep", "0.5"]);
+    screen.act(&["mousemove_relative", "15", "0", "sleep", "0.5", "mousemove_relative", "15", "0"]);
+    screen.wait_for("the slider to bring cloud", |now| now.grey(SKY) > few + 0.15);
+    // In one frame with the release, the next move would still drag.
+    screen.act(&["mouseup", "1", "sleep", "0.7"]);
+    let after = save(&mut screen, "after.clouds.ron");
+    assert!(after.model.coverage > before.model.coverage + 0.3, "coverage {}", after.model.coverage);
+    let mut only = after.clone();
+    only.model.coverage = before.model.coverage;
+    assert_eq!(only, before, "the slider changes coverage and nothing else");
+
+    with_file(&mut screen, "before.clouds.ron", LOAD, |screen| (screen.picture().grey(SKY) < few + 0.1).then_some(()));
+    assert_eq!(save(&mut screen, "again.clouds.ron"), before, "what was saved loads back identical");
+}
+
+#[test]
+fn a_window_may_be_small_large_hidden_and_shown() {
+    if in_the_other_run() {
+        return;
+    }
+    let (mut screen, _) = fly(&[]);
+    let window = screen.window.clone();
+    for [width, height] in [[64, 40], [1, 1], [7, 300], [900, 90], [640, 270]] {
+        screen.act(&["windowsize", &window, &width.to_string(), &height.to_string()]);
+        // Drawn to its last corner, and nothing beyond.
+        let corner = [(width - 1) / 2, 0, width, height.min(20)];
+        let beyond = [width.max(900), 300, SCREEN[0], SCREEN[1]];
+        screen.wait_for(&format!("a picture of {width} by {height}"), |now| {
+            now.brightness(corner) > 20.0 && now.brightness(beyond) == 0.0
+        });
+    }
+    screen.act(&["windowunmap", &window]);
+    screen.wait_for("the window to go", |now| now.brightness(SKY) == 0.0);
+    screen.act(&["windowmap", &window]);
+    screen.wait_for("it to come back", |now| now.brightness(SKY) > 20.0);
+}
+
+#[test]
+fn minimal_shows_a_sky() {
+    if in_the_other_run() {
+        return;
+    }
+    let mut screen = Screen::show("minimal", ".", &[]);
+    let above = [0, 0, SCREEN[0], 200];
+    screen.wait_for("a sky with clouds", |now| now.brightness(above) > 20.0 && (0.02..0.95).contains(&now.grey(above)));
+}
