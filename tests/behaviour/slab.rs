@@ -374,6 +374,8 @@ fn the_model_knows_nothing_of_the_renderer() {
                     "sample_medium",
                     "empty_medium",
                     "shell_intervals",
+                    "shell_roots",
+                    "debug_value",
                 ];
                 assert!(known.contains(&name), "{path} imports {name} of the model");
             }
