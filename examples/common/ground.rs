@@ -10,7 +10,7 @@ use bevy::{
     prelude::*,
 };
 
-use super::PLANET_RADIUS;
+use bevy_cumulus::reference::planet::PLANET_RADIUS;
 
 const SECTORS: u32 = 160;
 /// Arc length to the first ring (m), and the factor from a ring to the next: at 100 km the facets stay within

@@ -21,9 +21,6 @@ use bevy::{
 use bevy_cumulus::prelude::*;
 use serde::Serialize;
 
-/// Radius of the planet (m): that of Bevy's `Atmosphere::earth`.
-pub const PLANET_RADIUS: f64 = 6_360_000.0;
-
 /// Defaults for a picture: what is in it, and from where it is seen.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {

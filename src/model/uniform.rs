@@ -79,10 +79,9 @@ impl ModelUniform {
         let map = frame.map - wind * seconds;
         let turned = DVec2::new(0.8 * map.x - 0.6 * map.y, 0.6 * map.x + 0.8 * map.y);
         let group_scale = f64::from(model.map_scale) * GROUP_SCALE;
-        let wrap = |metres: DVec2, scale: f64| wrapped(metres, scale);
-        let own = wrap(map, model.map_scale.into());
-        let group = wrap(turned, group_scale);
-        let kind = wrap(map, model.type_scale.into());
+        let own = wrapped(map, model.map_scale.into());
+        let group = wrapped(turned, group_scale);
+        let kind = wrapped(map, model.type_scale.into());
         let volume = |scale: f32| {
             let xz = wrapped(map, scale.into());
             let y = (-rise / f64::from(scale)).rem_euclid(1.0) as f32;

@@ -22,14 +22,12 @@ use super::{
 };
 use crate::{
     model::{ModelUniform, TangentFrame, TexelSizes},
+    reference::planet::PLANET_RADIUS,
     settings::{
         CloudDebugView, CloudLighting, CloudModel, CloudQuality, CloudSettings, CloudView, GoodSettings, Validate,
     },
     textures::CloudTextureViews,
 };
-
-/// Planet radius where the scene has no `Atmosphere` (m): that of Bevy's default one.
-const EARTH_RADIUS: f64 = 6_360_000.0;
 
 /// The settings of this frame.
 #[derive(Resource, Default)]
@@ -257,7 +255,8 @@ fn space_below(
 ) -> Option<TangentFrame> {
     let (centre, radius) = match atmosphere {
         Some(a) => (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius)),
-        None => (DVec3::new(0.0, -EARTH_RADIUS, 0.0), EARTH_RADIUS),
+        // Bevy's default planet.
+        None => (DVec3::new(0.0, -PLANET_RADIUS, 0.0), PLANET_RADIUS),
     };
     let camera = view.world_from_view.translation().as_dvec3() + settings.model.world_offset;
     TangentFrame::below(camera, centre, radius)
