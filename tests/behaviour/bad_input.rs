@@ -14,7 +14,7 @@ use bevy::{
 use bevy_cumulus::{CloudFrame, prelude::*, settings::SettingsError, settings::Validate};
 
 use crate::{
-    gpu::{headless_plugins, run_updates, times_logged},
+    gpu::{headless_plugins, run_until, run_updates, times_logged},
     stage::{CLEAR, exact, linear_pixels, render_components, settle, slab_app, spawn_linear},
     view::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
 };
@@ -351,8 +351,11 @@ fn a_device_that_cannot_is_named_once_and_the_app_runs_on() {
     let view = spawn_linear(&mut app, SIZE, looking_up());
     spawn_sun(&mut app, Vec3::NEG_Y);
     run_updates(&mut app, 5);
+    // Bevy's own shaders load while the app runs: how many frames that takes is the machine's affair.
+    run_until(&mut app, "the camera draws its clear colour", 500, |app| is_bare(app, &view));
+    run_updates(&mut app, 5);
     assert_eq!(times_logged(&format!("clouds are off: {reason}")), 1, "not reported once");
-    assert!(is_bare(&app, &view), "the camera does not draw, or draws clouds");
+    assert!(is_bare(&app, &view), "the camera draws clouds");
     assert!(!app.world().resource::<CloudStatus>().is_ready());
 }
 
