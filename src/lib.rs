@@ -51,7 +51,7 @@ use bevy::{
 };
 
 pub use model::ModelShader;
-pub use render::{CloudBuffer, CloudFrame, CloudStatus};
+pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
     CloudTextures, CloudView,
@@ -62,9 +62,9 @@ pub mod prelude {
     pub use crate::{
         CloudBuffer, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings,
-            CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution, PhaseFunction,
-            TemporalMode,
+            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
+            CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
+            PhaseFunction, TemporalMode,
         },
     };
 }

@@ -35,10 +35,15 @@ pub(crate) struct CloudBindGroups {
     pub empty: BindGroup,
     pub model: BindGroup,
     pub sky: (CachedComputePipelineId, BindGroup),
-    pub march: (CachedComputePipelineId, BindGroup),
-    pub accumulate: (CachedComputePipelineId, BindGroup),
+    pub light: Light,
     pub composite: (CachedRenderPipelineId, BindGroup),
     pub publish: Option<(CachedComputePipelineId, BindGroup)>,
+}
+
+/// How the cloud's light is found.
+pub(crate) enum Light {
+    March { march: (CachedComputePipelineId, BindGroup), accumulate: (CachedComputePipelineId, BindGroup) },
+    PathTrace { trace: (CachedComputePipelineId, BindGroup), noise: Option<(CachedComputePipelineId, BindGroup)> },
 }
 
 /// A view's ambient light, written by the sky stage.
@@ -175,6 +180,7 @@ fn view_bind_groups(
         multisampled,
         target: item.view.target_format,
         debug: item.cloud.debug.shader(),
+        path_traced: item.cloud.is_path_traced(),
     };
     let ids = pipelines.get(cache, model, variant);
     // All stages or none: a composite without a march would blend what nobody has written.
@@ -189,19 +195,61 @@ fn view_bind_groups(
     let group = |label: &'static str, descriptor: &BindGroupLayoutDescriptor, entries: &[BindGroupEntry]| {
         device.create_bind_group(label, &layout(descriptor), entries)
     };
-    let march = group(
-        "cloud_march",
-        &pipelines.march[ms],
-        &BindGroupEntries::sequential((
-            frame.clone(),
-            sky_light.as_entire_binding(),
-            textures.blue_noise.as_ref()?,
-            depth,
-            history.newest(),
-            &history.distances,
-            world_from_local.clone(),
-        )),
-    );
+    let light = match ids.traced {
+        None => Light::March {
+            march: (
+                ids.drawable_march(cache),
+                group(
+                    "cloud_march",
+                    &pipelines.march[ms],
+                    &BindGroupEntries::sequential((
+                        frame.clone(),
+                        sky_light.as_entire_binding(),
+                        textures.blue_noise.as_ref()?,
+                        depth,
+                        history.newest(),
+                        &history.distances,
+                        world_from_local.clone(),
+                    )),
+                ),
+            ),
+            accumulate: (
+                ids.accumulate,
+                group(
+                    "cloud_accumulate",
+                    &pipelines.accumulate,
+                    &BindGroupEntries::sequential((
+                        frame.clone(),
+                        &history.frames_view,
+                        history.sum_before(),
+                        history.sum_after(),
+                    )),
+                ),
+            ),
+        },
+        Some([trace, noise]) => {
+            let [before, after] = history.moments()?;
+            let entries = BindGroupEntries::sequential((
+                frame.clone(),
+                history.sum_before(),
+                before,
+                depth,
+                history.sum_after(),
+                &history.distances,
+                world_from_local.clone(),
+                after,
+            ));
+            let image = item.cloud.noise.and_then(|id| images.get(id));
+            Light::PathTrace {
+                trace: (trace, group("cloud_path_trace", &pipelines.path_tracer.trace[ms], &entries)),
+                noise: image.map(|image| {
+                    let entries =
+                        BindGroupEntries::sequential((frame.clone(), history.sum_after(), after, &image.texture_view));
+                    (noise, group("cloud_noise", &pipelines.path_tracer.noise, &entries))
+                }),
+            }
+        }
+    };
     let resolved = BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth));
     let publish = item.cloud.buffer.and_then(|id| images.get(id)).map(|image| {
         let entries = BindGroupEntries::sequential((
@@ -220,18 +268,10 @@ fn view_bind_groups(
             group(
                 "cloud_sky",
                 &pipelines.sky,
-                &BindGroupEntries::sequential((frame.clone(), sky_light.as_entire_binding(), world_from_local)),
+                &BindGroupEntries::sequential((frame, sky_light.as_entire_binding(), world_from_local)),
             ),
         ),
-        march: (ids.drawable_march(cache), march),
-        accumulate: (
-            ids.accumulate,
-            group(
-                "cloud_accumulate",
-                &pipelines.accumulate,
-                &BindGroupEntries::sequential((frame, &history.frames_view, history.sum_before(), history.sum_after())),
-            ),
-        ),
+        light,
         composite: (ids.composite, group("cloud_composite", &pipelines.composite[ms], &resolved)),
         publish,
         air,

@@ -82,6 +82,8 @@ pub(crate) struct CloudHistory {
     pub frames_view: TextureView,
     layer_views: Vec<TextureView>,
     sums: [TextureView; 2],
+    /// Of the path tracer's samples.
+    moments: Option<[TextureView; 2]>,
     /// Mean cloud distance and marched limit (m).
     pub distances: TextureView,
 }
@@ -118,6 +120,10 @@ impl CloudHistory {
                 .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() }),
             layer_views: (0..frame.layers()).map(layer).collect(),
             sums: [0, 1].map(|_| whole(texture("cloud_sum", TextureFormat::Rgba32Float, 1))),
+            moments: key
+                .quality
+                .is_path_traced()
+                .then(|| [0, 1].map(|_| whole(texture("cloud_path_moments", TextureFormat::Rgba32Float, 1)))),
             distances: whole(texture("cloud_distances", TextureFormat::Rg32Float, 1)),
             frames,
             key,
@@ -128,11 +134,14 @@ impl CloudHistory {
 
     /// Goes on to the next frame, or starts over where something changed or the last frame was not drawn.
     pub fn advance(&mut self, device: &RenderDevice, key: HistoryKey, pose: Pose, drawn: bool) {
-        if key.size != self.key.size || key.window != self.key.window {
+        let path_traced = key.quality.is_path_traced();
+        if key.size != self.key.size || key.window != self.key.window || path_traced != self.moments.is_some() {
             *self = Self::new(device, key, pose);
             return;
         }
-        let keep = drawn && key == self.key && stands_still(&self.pose, &pose, key.window, self.frame.exposure);
+        // Path-traced frames add up without end: nothing may move at all.
+        let span = if path_traced { f32::MAX } else { key.window as f32 };
+        let keep = drawn && key == self.key && stands_still(&self.pose, &pose, span, self.frame.exposure);
         self.frame = if keep {
             FrameInWindow {
                 index: self.frame.index.wrapping_add(1),
@@ -166,6 +175,11 @@ impl CloudHistory {
     pub fn sum_after(&self) -> &TextureView {
         &self.sums[(self.frame.index & 1 ^ 1) as usize]
     }
+    /// The path tracer's moments before and with this frame.
+    pub fn moments(&self) -> Option<[&TextureView; 2]> {
+        let [even, odd] = self.moments.as_ref()?;
+        Some(if self.frame.index & 1 == 0 { [even, odd] } else { [odd, even] })
+    }
     /// The newest frame, to be copied.
     pub fn newest_copy(&self) -> TexelCopyTextureInfo<'_> {
         TexelCopyTextureInfo { origin: Origin3d { x: 0, y: 0, z: self.frame.layer() }, ..self.frames.as_image_copy() }
@@ -173,9 +187,8 @@ impl CloudHistory {
 }
 
 /// Whether the window may go on: the thesis's window is right only while nothing moves. The camera must not at all;
-/// clouds and sun may move less than shows within a window.
-fn stands_still(before: &Pose, now: &Pose, window: u32, stored_exposure: f32) -> bool {
-    let frames = window as f32;
+/// clouds and sun may move less than shows within a window of so many frames.
+fn stands_still(before: &Pose, now: &Pose, frames: f32, stored_exposure: f32) -> bool {
     let camera = before.clip_from_view == now.clip_from_view
         && before.position.distance(now.position) < 1e-3
         && before.rotation.abs_diff_eq(now.rotation, 1e-5);
@@ -222,7 +235,7 @@ mod tests {
     #[test]
     fn motion_starts_over_and_a_breeze_does_not() {
         let still = pose();
-        assert!(stands_still(&still, &Pose { seconds: 1.0 / 60.0, ..still }, 8, 1.0));
+        assert!(stands_still(&still, &Pose { seconds: 1.0 / 60.0, ..still }, 8.0, 1.0));
         for moved in [
             Pose { position: Vec3::X, ..still },
             Pose { rotation: Quat::from_rotation_y(0.01), ..still },
@@ -232,7 +245,16 @@ mod tests {
             Pose { exposure: 8.0, ..still },
             Pose { clip_from_view: Mat4::from_scale(Vec3::splat(2.0)), ..still },
         ] {
-            assert!(!stands_still(&still, &moved, 8, 1.0), "{moved:?}");
+            assert!(!stands_still(&still, &moved, 8.0, 1.0), "{moved:?}");
         }
+    }
+
+    #[test]
+    fn without_end_nothing_may_move() {
+        let still = pose();
+        assert!(stands_still(&still, &still, f32::MAX, 1.0));
+        assert!(!stands_still(&still, &Pose { seconds: 1e-6, ..still }, f32::MAX, 1.0));
+        let sun = Sun { direction: Vec3::new(1e-5, 1.0, 0.0), ..still.sun };
+        assert!(!stands_still(&still, &Pose { sun, ..still }, f32::MAX, 1.0));
     }
 }

@@ -27,6 +27,22 @@ impl MarchResolution {
     }
 }
 
+/// How the light that clouds send to the camera is found.
+#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+pub enum CloudMethod {
+    /// A ray march with the lighting model of [`CloudLighting`](super::CloudLighting); the default.
+    #[default]
+    March,
+    /// One path a pixel and frame, of any length, averaged for as long as nothing moves: the truth that the march
+    /// approximates, for stills and for judging the rest. It reads the model, sun, sky, phase function (in full, without
+    /// `phase_limit`), ground albedo, cut-off distance, fade and aerial perspective, and nothing else of lighting and
+    /// quality. Hundreds of frames make a picture; see [`CloudNoise`](crate::CloudNoise). Objects of the scene hide
+    /// clouds, but cast no shadow on them. Where [`ModelShader`](crate::ModelShader) lacks `extinction_bound`, nothing is
+    /// drawn.
+    PathTrace,
+}
+
 /// How frames are combined over time.
 #[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 #[reflect(Default, Serialize, Deserialize, PartialEq)]
@@ -52,11 +68,14 @@ pub enum Integration {
 /// Steps, thresholds, resolution and temporal mode.
 ///
 /// A resource for all views; [`CloudView::quality`](super::CloudView::quality) overrides it for one. Start from
-/// [`low`](Self::low), [`medium`](Self::medium), [`high`](Self::high) (the default) or [`ultra`](Self::ultra).
+/// [`low`](Self::low), [`medium`](Self::medium), [`high`](Self::high) (the default), [`ultra`](Self::ultra) or
+/// [`reference`](Self::reference).
 #[derive(Resource, Reflect, Serialize, Deserialize, Clone, PartialEq, Debug)]
 #[reflect(Resource, Default, Serialize, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudQuality {
+    /// How light is found. Default [`CloudMethod::March`].
+    pub method: CloudMethod,
     /// Size of the marched buffer. Cost falls with its area. Default [`MarchResolution::Half`].
     pub resolution: MarchResolution,
     /// Length of a step inside cloud near the camera (m). Cost is inverse to it. Default 90.
@@ -146,6 +165,7 @@ impl CloudQuality {
     /// The default: half resolution, 8 frames, 90 km.
     pub fn high() -> Self {
         Self {
+            method: CloudMethod::March,
             resolution: MarchResolution::Half,
             step: 90.0,
             step_growth: 0.008,
@@ -184,20 +204,38 @@ impl CloudQuality {
         }
     }
 
-    /// The preset of this name (`low`, `medium`, `high`, `ultra`), if there is one.
+    /// The truth, for stills: [`CloudMethod::PathTrace`] at every pixel, 150 km. Noise falls with the square root of the
+    /// frames drawn while nothing moves.
+    pub fn reference() -> Self {
+        Self { method: CloudMethod::PathTrace, resolution: MarchResolution::Full, ..Self::ultra() }
+    }
+
+    /// The preset of this name (`low`, `medium`, `high`, `ultra`, `reference`), if there is one.
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
             "low" => Self::low(),
             "medium" => Self::medium(),
             "high" => Self::high(),
             "ultra" => Self::ultra(),
+            "reference" => Self::reference(),
             _ => return None,
         })
     }
 
-    /// Frames held: `window`, or 1 where [`TemporalMode::Off`].
+    /// Whether [`CloudMethod::PathTrace`] is chosen.
+    pub(crate) fn is_path_traced(&self) -> bool {
+        self.method == CloudMethod::PathTrace
+    }
+
+    /// Pixels a texel of the clouds spans along each axis: those of the resolution, 1 where paths are traced.
+    pub(crate) fn divisor(&self) -> u32 {
+        if self.is_path_traced() { 1 } else { self.resolution.divisor() }
+    }
+
+    /// Frames held: `window`, or 1 where [`TemporalMode::Off`] or paths are traced, whose sum alone is kept.
     pub fn held_frames(&self) -> u32 {
         match self.temporal {
+            _ if self.is_path_traced() => 1,
             TemporalMode::Off => 1,
             TemporalMode::SlidingWindow => self.window.clamp(1, 16),
         }

@@ -1,6 +1,7 @@
 //! What the crate does, by behaviour. GPU tests run on whatever Vulkan device there is, a software one too, and fail
 //! where there is none.
 
+mod adding;
 mod bad_input;
 mod bound;
 mod cameras;
@@ -12,6 +13,7 @@ mod halves;
 mod headless;
 mod intervals;
 mod occlusion;
+mod path_tracer;
 mod phases;
 mod sampling_patterns;
 mod schedule;

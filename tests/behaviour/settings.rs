@@ -246,7 +246,7 @@ fn presets_parse_validate_and_are_read_back_as_written() {
     for (k, preset) in presets.iter().enumerate() {
         assert!(!presets[..k].contains(preset), "two presets are the same: {preset}");
     }
-    for name in ["low", "medium", "high", "ultra"] {
+    for name in ["low", "medium", "high", "ultra", "reference"] {
         CloudQuality::named(name).unwrap().validate().unwrap_or_else(|error| panic!("{name}: {error}"));
     }
     assert_eq!(CloudQuality::named("best"), None);
