@@ -105,18 +105,19 @@ fn solve(mut a: Matrix, mut b: Matrix) -> Matrix {
 
 /// A homogeneous slab.
 pub struct Slab {
-    /// Cosines to the vertical and quadrature weights; the last is the vertical itself, of no weight.
-    pub nodes: Vec<(f64, f64)>,
+    /// Cosines to the vertical and quadrature weights; the last two, the direction asked for and the vertical itself,
+    /// weigh nothing to speak of.
+    nodes: Vec<(f64, f64)>,
     reflection: Matrix,
     transmission: Matrix,
     depth: f64,
 }
 
 impl Slab {
-    /// Of this vertical optical depth, albedo and Legendre moments, over `n` nodes.
-    pub fn new(depth: f64, albedo: f64, moments: &[f64], n: usize) -> Self {
+    /// Of this vertical optical depth, albedo and Legendre moments, over `n` nodes and the direction `mu`.
+    pub fn new(depth: f64, albedo: f64, moments: &[f64], n: usize, mu: f64) -> Self {
         let mut nodes = gauss(n);
-        nodes.push((1.0, 0.0));
+        nodes.extend([(mu, 1e-12), (1.0, 1e-12)]);
         let polynomials: Vec<Vec<f64>> = nodes.iter().map(|(mu, _)| legendre(moments.len(), *mu)).collect();
         let scatter = |i: usize, j: usize, sign: f64| -> f64 {
             let mut s = 1.0;
@@ -165,19 +166,20 @@ impl Slab {
         Self { nodes, reflection: r, transmission: t, depth }
     }
 
-    /// Radiance that node `i` sees from above, under a sky of radiance 1.
-    pub fn sky_reflected(&self, i: usize) -> f64 {
-        self.reflection[i].iter().sum()
+    /// Radiance that the direction sees from above, under a sky of radiance 1.
+    pub fn sky_reflected(&self) -> f64 {
+        self.reflection[self.nodes.len() - 2].iter().sum()
     }
 
-    /// Radiance that node `i` sees from below, but for what comes straight through.
-    pub fn sky_scattered_through(&self, i: usize) -> f64 {
+    /// Radiance that the direction sees from below, but for what comes straight through.
+    pub fn sky_scattered_through(&self) -> f64 {
+        let i = self.nodes.len() - 2;
         self.transmission[i].iter().sum::<f64>() - (-self.depth / self.nodes[i].0).exp()
     }
 
-    /// Vertical radiance for a sun of illuminance 1 (across its rays) at node `j`: from above, from below.
-    pub fn sun_seen_vertically(&self, j: usize) -> [f64; 2] {
-        let last = self.nodes.len() - 1;
+    /// Vertical radiance for a sun of illuminance 1 (across its rays) in the direction: from above, from below.
+    pub fn sun_seen_vertically(&self) -> [f64; 2] {
+        let (j, last) = (self.nodes.len() - 2, self.nodes.len() - 1);
         [&self.reflection, &self.transmission].map(|m| m[last][j] / (2.0 * PI * self.nodes[j].1))
     }
 }
