@@ -60,6 +60,9 @@ pub struct Options {
     /// Write the cloud buffer: radiance (cd/m²) and transmittance, 32-bit float
     #[arg(long, value_name = "CLOUD.exr")]
     pub cloud: Option<PathBuf>,
+    /// Write the reference's noise: standard errors of luminance (cd/m²) and of transmittance, samples, share lost
+    #[arg(long, value_name = "NOISE.exr")]
+    pub noise: Option<PathBuf>,
     /// Write what each pass and the whole frame took (ms)
     #[arg(long, value_name = "T.json")]
     pub timings: Option<PathBuf>,
@@ -105,6 +108,7 @@ pub struct Plan {
     pub ev100: f32,
     pub out: Option<PathBuf>,
     pub cloud: Option<PathBuf>,
+    pub noise: Option<PathBuf>,
     pub timings: Option<PathBuf>,
     camera: CameraPose,
     travel: [f32; 5],
@@ -122,9 +126,9 @@ impl Options {
         if !strip.is_empty() {
             let pictures = strip.len() as u32;
             ensure!(
-                self.cloud.is_none() && self.timings.is_none(),
-                "--scene {}: a strip of {pictures} pictures has no single cloud buffer and no timings; leave --cloud and \
-                 --timings out",
+                self.cloud.is_none() && self.noise.is_none() && self.timings.is_none(),
+                "--scene {}: a strip of {pictures} pictures has no single cloud buffer, noise and timings; leave --cloud, \
+                 --noise and --timings out",
                 scene.name
             );
             ensure!(
@@ -133,6 +137,10 @@ impl Options {
                 65_536 / pictures
             );
         }
+        ensure!(
+            self.noise.is_none() || settings.quality.method == CloudMethod::PathTrace,
+            "--noise: only --quality reference (or quality.method = PathTrace) knows its noise"
+        );
         Ok(Plan {
             scene,
             named,
@@ -149,6 +157,7 @@ impl Options {
             ev100: self.ev.unwrap_or(sun.ev100() + scene.ev_offset),
             out: self.out.clone(),
             cloud: self.cloud.clone(),
+            noise: self.noise.clone(),
             timings: self.timings.clone(),
             travel: self.travel.unwrap_or_default(),
             sun_move: self.sun_move.unwrap_or_default(),
@@ -186,7 +195,12 @@ impl Plan {
 
     /// The files asked for: option, path and extension.
     pub fn files(&self) -> Vec<(&'static str, &Path, &'static str)> {
-        let all = [("--out", &self.out, "png"), ("--cloud", &self.cloud, "exr"), ("--timings", &self.timings, "json")];
+        let all = [
+            ("--out", &self.out, "png"),
+            ("--cloud", &self.cloud, "exr"),
+            ("--noise", &self.noise, "exr"),
+            ("--timings", &self.timings, "json"),
+        ];
         all.into_iter().filter_map(|(option, path, kind)| Some((option, path.as_deref()?, kind))).collect()
     }
 

@@ -22,7 +22,7 @@ use bevy::{
     window::ExitCondition,
     winit::WinitPlugin,
 };
-use bevy_cumulus::{CloudBuffer, CloudStatus, prelude::*, textures::CloudTextureStatus};
+use bevy_cumulus::{CloudBuffer, CloudNoise, CloudStatus, prelude::*, textures::CloudTextureStatus};
 use image::{RgbImage, Rgba32FImage};
 
 use crate::{
@@ -42,6 +42,7 @@ const SETTLING_FRAMES: u32 = 4;
 pub struct Shot {
     pub picture: Option<RgbImage>,
     pub cloud: Option<Rgba32FImage>,
+    pub noise: Option<Rgba32FImage>,
     pub timings: Timings,
     pub adapter: String,
 }
@@ -51,6 +52,7 @@ pub struct Shot {
 struct Caught {
     picture: Option<Image>,
     cloud: Option<Vec<u8>>,
+    noise: Option<Vec<u8>>,
 }
 
 /// Renders the plan.
@@ -66,6 +68,7 @@ struct Studio {
     target: Handle<Image>,
     /// Absent where only timings are wanted, so that it costs them nothing.
     buffer: Option<Handle<Image>>,
+    noise: Option<Handle<Image>>,
 }
 
 fn engine(plan: &Plan) -> App {
@@ -114,6 +117,7 @@ impl Studio {
         let target = images.add(Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None));
         let wanted = plan.out.is_some() || plan.cloud.is_some();
         let buffer = wanted.then(|| images.add(CloudBuffer::image(width, height)));
+        let noise = plan.noise.is_some().then(|| images.add(CloudNoise::image(width, height)));
         let camera = world
             .spawn((
                 common::camera(plan.ev100),
@@ -128,7 +132,10 @@ impl Studio {
         if let Some(buffer) = &buffer {
             world.entity_mut(camera).insert(CloudBuffer(buffer.clone()));
         }
-        let mut studio = Self { app, camera, sun, target, buffer };
+        if let Some(noise) = &noise {
+            world.entity_mut(camera).insert(CloudNoise(noise.clone()));
+        }
+        let mut studio = Self { app, camera, sun, target, buffer, noise };
         studio.pose(plan, 0);
         Ok(studio)
     }
@@ -209,7 +216,7 @@ impl Studio {
             view.reset += 1;
         }
         let stage = Stage::begin("rendering frames", plan.frames.into());
-        let mut readback = None;
+        let mut readback = Vec::new();
         let (mut update, mut waiting_since) = (0, Instant::now());
         loop {
             let counted = update < plan.frames;
@@ -225,7 +232,7 @@ impl Studio {
             if counted {
                 timings.add_frame(began.elapsed().as_secs_f64() * 1e3);
             }
-            if let Some(entity) = readback.take() {
+            for entity in std::mem::take(&mut readback) {
                 self.app.world_mut().entity_mut(entity).remove::<Readback>();
             }
             let of_counted = (LAG..plan.frames + LAG).contains(&update);
@@ -244,7 +251,7 @@ impl Studio {
     }
 
     /// Asks for what the next update renders.
-    fn request(&mut self, plan: &Plan) -> Option<Entity> {
+    fn request(&mut self, plan: &Plan) -> Vec<Entity> {
         let world = self.app.world_mut();
         if plan.out.is_some() {
             world.spawn(Screenshot::image(self.target.clone())).observe(
@@ -253,17 +260,24 @@ impl Studio {
                 },
             );
         }
-        let buffer = self.buffer.clone()?;
-        let mut entity = world.spawn(Readback::texture(buffer));
-        entity.observe(|read: On<ReadbackComplete>, mut caught: ResMut<Caught>| {
-            caught.cloud.get_or_insert_with(|| read.data.clone());
+        type Slot = fn(&mut Caught) -> &mut Option<Vec<u8>>;
+        let slots: [(_, Slot); 2] =
+            [(&self.buffer, |caught| &mut caught.cloud), (&self.noise, |caught| &mut caught.noise)];
+        let asked = slots.into_iter().filter_map(|(image, slot)| {
+            let mut entity = world.spawn(Readback::texture(image.clone()?));
+            entity.observe(move |read: On<ReadbackComplete>, mut caught: ResMut<Caught>| {
+                slot(&mut caught).get_or_insert_with(|| read.data.clone());
+            });
+            Some(entity.id())
         });
-        Some(entity.id())
+        asked.collect()
     }
 
     fn is_back(&self, plan: &Plan) -> bool {
         let caught = self.app.world().resource::<Caught>();
-        (plan.out.is_none() || caught.picture.is_some()) && (self.buffer.is_none() || caught.cloud.is_some())
+        (plan.out.is_none() || caught.picture.is_some())
+            && (self.buffer.is_none() || caught.cloud.is_some())
+            && (self.noise.is_none() || caught.noise.is_some())
     }
 
     fn picture(&mut self, plan: &Plan) -> Result<Shot> {
@@ -293,10 +307,11 @@ impl Studio {
         let caught = std::mem::take(&mut *world.resource_mut::<Caught>());
         let picture = caught.picture.map(Image::try_into_dynamic).transpose();
         let picture = picture.map_err(|error| anyhow!("the picture: {error}"))?;
-        let cloud = caught.cloud.map(|bytes| cloud_image(plan.size, &bytes)).transpose()?;
+        let [cloud, noise] =
+            [caught.cloud, caught.noise].map(|bytes| bytes.map(|bytes| cloud_image(plan.size, &bytes)).transpose());
         let info = world.resource::<RenderAdapterInfo>();
         let adapter = format!("{} ({:?})", info.name, info.backend);
-        Ok(Shot { picture: picture.map(|picture| picture.to_rgb8()), cloud, timings, adapter })
+        Ok(Shot { picture: picture.map(|picture| picture.to_rgb8()), cloud: cloud?, noise: noise?, timings, adapter })
     }
 }
 
