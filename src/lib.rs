@@ -51,6 +51,10 @@ use bevy::{
 };
 
 pub use model::ModelShader;
+pub use reference::{
+    keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
+    query::CloudSky,
+};
 pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
@@ -60,7 +64,7 @@ pub use settings::{
 /// What most users need.
 pub mod prelude {
     pub use crate::{
-        CloudBuffer, CloudStatus, CloudsPlugin,
+        CloudBuffer, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
             CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
             CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,

@@ -27,6 +27,10 @@ pub use view::{CloudClock, CloudView};
 #[derive(Resource, Clone, Debug, Default)]
 pub(crate) struct GoodSettings(pub CloudSettings);
 
+/// Where [`GoodSettings`] takes in what has changed, in `Last`.
+#[derive(SystemSet, Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct KeepGood;
+
 /// Settings resources, their types, checks and clock.
 pub(crate) struct CloudSettingsPlugin;
 
@@ -66,7 +70,8 @@ impl Plugin for CloudSettingsPlugin {
                     keep_good::<CloudTextures>,
                     keep_good::<CloudClock>,
                 )
-                    .chain(),
+                    .chain()
+                    .in_set(KeepGood),
             );
     }
 }

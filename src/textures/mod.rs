@@ -22,8 +22,10 @@ pub mod n_rooks;
 mod pipelines;
 mod profile;
 mod progress;
+pub(crate) mod readback;
 mod recipe;
 mod slots;
+mod texel;
 
 use std::sync::atomic::Ordering::Relaxed;
 

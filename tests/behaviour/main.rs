@@ -7,6 +7,7 @@ mod bound;
 mod cameras;
 mod debug_views;
 mod drift;
+mod field;
 mod goldens;
 mod gpu;
 mod halves;
