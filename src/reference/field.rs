@@ -247,3 +247,29 @@ fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cameras_agree_on_the_map() {
+        // A point seen from elsewhere against the point seen from itself, both as far away as this from each other and
+        // from the map's origin.
+        for (far, allowed) in [(5e3, 2e-3), (5e4, 2.0), (3e5, 400.0)] {
+            let planet = Planet::default();
+            let mut worst = 0.0_f64;
+            for k in 0..24 {
+                let angle = f64::from(k) * 0.2618;
+                let from = DVec3::new(far, 2000.0, 0.0);
+                let p = from + far * DVec3::new(angle.cos(), 0.0, angle.sin());
+                let frame = |eye| TangentFrame::below(eye, planet.centre, planet.radius).unwrap();
+                let seen = frame(from);
+                let local = seen.local_from_world * (p - from) + DVec3::Y * seen.altitude;
+                worst = worst.max((seen.map + map_position(local, planet.radius) - frame(p).map).length());
+            }
+            println!("{far} m: {worst} m aside");
+            assert!(worst < allowed, "{far} m: {worst} m aside");
+        }
+    }
+}

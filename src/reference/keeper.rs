@@ -13,19 +13,16 @@ use crate::{
     ModelShader,
     render::CloudStatus,
     settings::{GoodSettings, KeepGood},
-    textures::{
-        CloudTextureSlot, CloudTextureStatus,
-        readback::{self, CpuCopies},
-    },
+    textures::{CloudTextureSlot, CloudTextureStatus, cpu_copies::CpuCopies, readback},
 };
 
 /// Lets the CPU ask about the clouds: adds [`CloudField`] and keeps it as what is drawn. Add it with
 /// [`CloudsPlugin`](crate::CloudsPlugin), before or after.
 ///
 /// Costs, none of them without this plugin: the textures are read back once after each bake or change, a megabyte a
-/// frame and without waiting for the GPU, some 60 frames for all at the default sizes; then a few µs a frame. They take
-/// 36 MB of memory at the default sizes: 9.6 MB a volume of 128³, 5.6 MB each for coverage, its bound and the type map at
-/// 1024², as f32.
+/// frame and without waiting for the GPU, some 80 frames for all at the default sizes; otherwise next to nothing. They
+/// take 36 MB of memory at the default sizes: 9.6 MB a volume of 128³, 5.6 MB each for coverage, its bound and the type
+/// map at 1024², as f32.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CloudFieldPlugin;
 

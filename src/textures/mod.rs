@@ -17,6 +17,7 @@ mod bake;
 pub mod blue_noise;
 #[doc(hidden)]
 pub mod capture;
+pub(crate) mod cpu_copies;
 mod job;
 pub mod n_rooks;
 mod pipelines;

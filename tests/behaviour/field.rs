@@ -71,8 +71,8 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
 /// The twin's textures, each reading as much too high (`sign` 1) or too low (−1) as a GPU's filter may get it.
 ///
 /// A filter's weights have 8 bits, so what it returns is the texture within 1/256 of a texel, in each axis and between
-/// levels; coordinates are f32. Texels of 8 bits may be filtered in 8 bits: Mesa's software driver rounds after each of
-/// the three axes and between the levels.
+/// levels; coordinates are f32. Texels of 8 bits may be filtered in 8 bits, as Mesa's software driver does. The density
+/// rises with each reading but the type, so what these two twins say brackets what any such GPU may.
 struct Perturbed<'a> {
     exact: &'a CloudTextureSet,
     sign: f64,
@@ -80,9 +80,8 @@ struct Perturbed<'a> {
 
 /// Part of a texel, and of a level, that a weight may be wrong by.
 const WEIGHT: f64 = 1.0 / 256.0;
-/// What filtering in 8 bits may lose.
-const BYTES: f64 = ROUNDINGS / 255.0;
-const ROUNDINGS: f64 = 0.0;
+/// What filtering in 8 bits may lose: half a step where it is rounded, and half for the roundings on the way.
+const BYTES: f64 = 1.0 / 255.0;
 
 impl Perturbed<'_> {
     fn read(&self, texture: &Texture, at: DVec3, level: f64, rounding: f64) -> f64 {
@@ -216,7 +215,7 @@ fn percentile(sorted: &[f64], share: f64) -> f64 {
 fn gpu_and_cpu_agree_on_100_000_points_to_the_texture_filters_precision() {
     let mut app = field_app(small(1));
     let mut rng = StdRng::seed_from_u64(70);
-    let (mut errors, mut bias, mut clouds) = (Vec::new(), 0.0, 0);
+    let (mut errors, mut bias) = (Vec::new(), 0.0);
     for (k, Case { model, seconds, camera, seed }) in cases().into_iter().enumerate() {
         if app.world().resource::<CloudTextures>().seed != seed {
             app.insert_resource(small(seed));
@@ -235,53 +234,49 @@ fn gpu_and_cpu_agree_on_100_000_points_to_the_texture_filters_precision() {
         let twin = LocalModel::new(&model, seconds, camera, planet, textures).unwrap();
         let low = LocalModel::new(&model, seconds, camera, planet, &low).unwrap();
         let high = LocalModel::new(&model, seconds, camera, planet, &high).unwrap();
-        let (mut beyond, mut own, mut widths) = ((0.0_f64, [0.0; 4]), Vec::new(), Vec::new());
+        let (mut own, mut widths) = (Vec::new(), Vec::new());
         for (point, gpu) in points.iter().zip(found.as_chunks::<4>().0) {
             let [density, extinction, profile, bound] = gpu.map(f64::from);
             let p = Vec3::from_slice(point).as_dvec3();
             let lod = f64::from(point[3]);
             let cpu = twin.sample_medium(p, lod);
-            let range = [low.sample_medium(p, lod).density, high.sample_medium(p, lod).density];
-            let off = (range[0] - density).max(density - range[1]) / f64::from(model.density);
-            if off > beyond.0 {
-                beyond = (off, *point);
-            }
-            let error = (density - cpu.density) / f64::from(model.density);
+            let most = f64::from(model.density);
+            let [low, high] = [&low, &high].map(|twin| twin.sample_medium(p, lod).density);
+            assert!(
+                (low - F32 * most..=high + F32 * most).contains(&density),
+                "case {k}: {point:?}: density {density}, not {} ({low} to {high})",
+                cpu.density
+            );
             if cpu.density > 0.0 || density > 0.0 {
-                own.push(error.abs());
-                widths.push((range[1] - range[0]) / 2.0 / f64::from(model.density));
-                bias += error;
-                clouds += 1;
+                own.push((density - cpu.density).abs() / most);
+                widths.push(0.5 * (high - low) / most);
+                bias += (density - cpu.density) / most;
             }
             assert!((extinction - density * f64::from(model.extinction)).abs() <= 1e-6 * extinction);
             assert!(
-                (profile - cpu.profile).abs() < 0.02,
+                (profile - cpu.profile).abs() < 0.01,
                 "case {k}: {point:?}: profile {profile}, not {}",
                 cpu.profile
             );
-            let twins_bound = twin.density_bound(p, lod.exp2());
-            assert!((bound - twins_bound).abs() < 0.02, "case {k}: {point:?}: bound {bound}, not {twins_bound}");
+            let twins = twin.density_bound(p, lod.exp2());
+            assert!((bound - twins).abs() < 0.01 * most, "case {k}: {point:?}: bound {bound}, not {twins}");
         }
-        own.sort_by(f64::total_cmp);
-        widths.sort_by(f64::total_cmp);
-        println!("tolerance 50 % {:.5} most {:.5}", percentile(&widths, 0.5), percentile(&widths, 1.0));
-        println!(
-            "case {k}: {} in cloud, error 50 % {:.5} 99.9 % {:.5} most {:.5}, past its tolerance by {:?}",
-            own.len(),
-            percentile(&own, 0.5),
-            percentile(&own, 0.999),
-            percentile(&own, 1.0),
-            beyond
-        );
-        assert!(own.len() > 500, "case {k}: {} points in cloud", own.len());
+        println!("case {k}: {} in cloud, error {}, tolerance {}", own.len(), summary(&mut own), summary(&mut widths));
+        assert!(own.len() > 1000, "case {k}: {} points in cloud", own.len());
         errors.extend(own);
     }
-    errors.sort_by(f64::total_cmp);
-    let mean = bias / f64::from(clouds);
-    println!(
-        "all: {clouds} in cloud, error 50 % {:.5} 99.9 % {:.5} most {:.5}, mean {mean:+.6}",
-        percentile(&errors, 0.5),
-        percentile(&errors, 0.999),
-        percentile(&errors, 1.0)
-    );
+    let mean = bias / errors.len() as f64;
+    println!("{} in cloud, error {}, mean {mean:+.6}", errors.len(), summary(&mut errors));
+    // In whole steps of an 8-bit texel, 0.0039: half a step is usual, one and a half the most; none is lost on average.
+    assert!(percentile(&errors, 0.5) < 0.002 && percentile(&errors, 0.999) < 0.006, "{}", summary(&mut errors));
+    assert!(percentile(&errors, 1.0) < 0.01 && mean.abs() < 3e-4, "{} mean {mean}", summary(&mut errors));
+}
+
+/// What f32 arithmetic may lose of a density.
+const F32: f64 = 1e-4;
+
+fn summary(values: &mut [f64]) -> String {
+    values.sort_by(f64::total_cmp);
+    let [half, most, all] = [0.5, 0.999, 1.0].map(|share| percentile(values, share));
+    format!("{half:.5} (50 %) {most:.5} (99.9 %) {all:.5} (most)")
 }

@@ -9,13 +9,15 @@ use bevy::{
     render::{ExtractSchedule, Render, RenderApp, renderer::RenderGraph},
 };
 
-use crate::view::{Sky, clouds_app, spawn_sun, spawn_view, until_drawn};
+use bevy_cumulus::prelude::*;
+
+use crate::view::{Sky, clouds_app_with, spawn_sun, spawn_view, until_drawn};
 
 const OURS: &str = "bevy_cumulus::";
 
 /// An app that draws, so that every schedule has been built.
 fn drawn() -> App {
-    let mut app = clouds_app();
+    let mut app = clouds_app_with((CloudsPlugin, CloudFieldPlugin));
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     spawn_view(&mut app, UVec2::new(8, 8), Transform::default(), Sky::Atmosphere);
     until_drawn(&mut app);
