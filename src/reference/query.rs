@@ -178,7 +178,7 @@ impl CloudSky {
     /// As a camera at `a` sees it. Another camera's map lies a little aside: a metre, where both it and what it sees are
     /// 50 km from `a` and the map's origin.
     ///
-    /// Adaptive Simpson's rule, within 0.2 % of the value or 0.001, whichever is more; measured 0.04 % at most, against
+    /// Adaptive Simpson's rule, within 0.2 % of the value or 0.001, whichever is more; measured 0.06 % at most, against
     /// steps of half a metre. Time grows with the cloud on the way: about 10 µs through 100 m, a millisecond through 10 km.
     pub fn optical_depth(&self, a: impl Into<DVec3>, b: impl Into<DVec3>) -> f64 {
         let (a, b) = (a.into(), b.into());
@@ -187,7 +187,7 @@ impl CloudSky {
 
     /// Share of light that passes straight from `a` to `b` now, 0..=1: `e^−τ` of the [optical
     /// depth](Self::optical_depth), given up where less than 1e-7 is left. Within 0.001;
-    /// measured 0.00013 at most.
+    /// measured 0.0002 at most.
     pub fn transmittance(&self, a: impl Into<DVec3>, b: impl Into<DVec3>) -> f64 {
         let (a, b) = (a.into(), b.into());
         integrate::transmittance(self.depth(a, b - a, (b - a).length(), OPAQUE))
@@ -229,7 +229,8 @@ impl CloudSky {
         let at = |s: f64| eye + direction * s;
         let extinction = |s: f64| model.sample_medium(at(s), 0.0).extinction;
         let bound = |s: f64, half: f64| model.extinction_bound(at(s), half);
-        let panel = (2.0 * model.finest()).clamp(2.0, 100.0);
+        // Five samples over four texels.
+        let panel = (4.0 * model.finest()).clamp(4.0, 100.0);
         let mut depth = 0.0;
         for interval in layer_intervals(eye.y, direction.y, model.bounds(), model.radius(), length) {
             let accuracy = Accuracy { panel, relative: 2e-3, shortest: 0.25, enough: enough - depth };
