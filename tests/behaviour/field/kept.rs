@@ -22,7 +22,7 @@ use bevy_cumulus::{
 use super::{field_app, sky, small, until_current};
 use crate::{
     gpu::run_updates,
-    view::{clouds_app, spawn_sun},
+    view::{clouds_app, clouds_app_with, spawn_sun},
 };
 
 /// A volume whose texels all differ, and are no multiple of anything.
@@ -179,6 +179,24 @@ fn nothing_is_read_back_unless_asked_for() {
     run_updates(&mut without, 2);
     assert!(without.world().get_resource::<CloudField>().is_none());
     assert_eq!([systems(&without), systems(&field_app(small(1)))], [0, 2]);
+}
+
+#[test]
+fn the_sky_comes_without_anyone_waiting_for_the_gpu() {
+    let mut app = clouds_app_with((CloudsPlugin, CloudFieldPlugin));
+    app.insert_resource(small(1));
+    let there = |app: &App| {
+        let field = app.world().resource::<CloudField>();
+        field.is_ready() && field.is_current()
+    };
+    // Nothing but the app's own frames, which submit and never wait.
+    for _ in 0..5000 {
+        if there(&app) {
+            return;
+        }
+        app.update();
+    }
+    panic!("not there after 5000 frames");
 }
 
 #[test]
