@@ -1,7 +1,7 @@
 //! The built-in model, "what is at p?". Twin of `model/model.wesl`, function for function.
 //!
 //! Offsets and rates are those that the shader is given (`model/uniform.rs`); positions are f64. What is read from
-//! textures comes through [`ModelTextures`].
+//! textures comes through [`ModelTextures`]. A [`ModelShader`](crate::ModelShader) has no twin.
 
 use bevy::math::{DVec2, DVec3, DVec4, Vec4Swizzles};
 
