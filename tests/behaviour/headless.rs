@@ -297,3 +297,50 @@ fn without_sky_and_cloud_the_picture_is_black_above() {
     assert!(read(&folder.join("shot.png")).to_rgb8().pixels().all(|p| p.0 == [0; 3]));
     assert!(read_cloud(&folder.join("cloud.exr")).pixels().all(|p| p.0 == [0.0, 0.0, 0.0, 1.0]));
 }
+
+#[test]
+fn a_batch_makes_the_pictures_that_its_lines_make_alone() {
+    let still = ["--size", "32x18", "--frames", "1", "--set", "quality.temporal=off", "--set", "quality.offsets=false"];
+    let lines = ["--set model.coverage=0.3", "--set model.coverage=-0.2 --set quality.resolution=quarter --time 50"];
+    let folder = Folder::new();
+    let numbered = (1..).zip(lines).map(|(n, line)| format!("{line} --cloud {n}.exr # {n}\n\n")).collect::<String>();
+    fs::write(folder.join("batch.txt"), numbered).expect("the folder can be written");
+    let output = run_in(&folder, &[&still[..], &SMALL, &["--batch", "batch.txt"]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "[1/2] 1.exr\n[2/2] 2.exr\n");
+    for (n, line) in (1..).zip(lines) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let alone = render(&[&still[..], &words, &["--cloud", "cloud.exr"]].concat());
+        let (one, other) = (read_cloud(&alone.join("cloud.exr")), read_cloud(&folder.join(format!("{n}.exr"))));
+        assert!(one == other, "picture {n} of the batch differs from the one made alone");
+    }
+}
+
+#[test]
+fn a_mistake_in_a_batch_is_named_with_its_line() {
+    let cases = [
+        ("--out a.png\n--set model.colour=1 --out b.png", "line 2", "model.colour"),
+        ("--out a.png\n\n--size 16x16 --out b.png", "line 3", "--size"),
+        ("--out a.png\n--set textures.seed=9 --out b.png", "line 2", "textures"),
+        ("--frames 4", "line 1", "--out"),
+        ("# nothing", "batch.txt", "no picture"),
+        ("--batch again.txt --out a.png", "line 1", "no picture"),
+    ];
+    let folder = Folder::new();
+    for (text, at, what) in cases {
+        fs::write(folder.join("batch.txt"), text).expect("the folder can be written");
+        let output = run_in(&folder, &["--batch", "batch.txt"]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && said.contains(at) && said.contains(what), "{text}: {said}");
+        assert!(!said.contains("panicked") && !folder.join("a.png").exists(), "{text}: {said}");
+    }
+}
+
+#[test]
+fn effective_prints_the_settings_and_renders_nothing() {
+    let options = ["--effective", "--scene", "sunset", "--quality", "low", "--set", "model.density=0.7"];
+    let output = run_in(&Folder::new(), &options);
+    let all: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!((&all["quality"]["resolution"], &all["scene"]), (&"Quarter".into(), &"sunset".into()));
+    assert_eq!(all["model"]["density"], 0.7);
+}

@@ -19,6 +19,8 @@ const PASSES: [&str; 4] = ["cloud_sky", "cloud_march", "cloud_accumulate", "clou
 pub struct Engine {
     pub headless: PathBuf,
     pub out: PathBuf,
+    /// The scenes' fields of view are divided by this.
+    pub zoom: f64,
 }
 
 /// One picture to be made.
@@ -66,6 +68,20 @@ impl Engine {
         serde_json::from_slice(&output.stdout).context("headless --effective")
     }
 
+    /// Options for the middle of a scene's view, as large as the zoom says; none without zoom.
+    pub fn view(&self, scene: &str) -> Result<String> {
+        if self.zoom == 1.0 {
+            return Ok(String::new());
+        }
+        let camera = &self.effective(&format!("--scene {scene}"))?["camera"];
+        let number = |value: &Value| value.as_f64().with_context(|| format!("headless --effective: camera {camera}"));
+        let [x, y, z] = [0, 1, 2].map(|i| number(&camera["position"][i]));
+        let (yaw, pitch, fov) = (number(&camera["yaw"])?, number(&camera["pitch"])?, number(&camera["fov"])?);
+        // So much smaller that the middle pixels keep their shape: a picture plane is flat.
+        let fov = 2.0 * ((fov.to_radians() / 2.0).tan() / self.zoom).atan().to_degrees();
+        Ok(format!("--camera {},{},{},{yaw},{pitch},{fov}", x?, y?, z?))
+    }
+
     /// Frames after which a picture with these options is finished: its window is full.
     pub fn frames(&self, options: &str) -> Result<u32> {
         let quality = &self.effective(options)?["quality"];
@@ -95,6 +111,7 @@ impl Engine {
         let mut child = Command::new(fs::canonicalize(&self.headless)?)
             .current_dir(&folder)
             .args(["--scene", scene, "--size", size, "--batch", "batch.txt"])
+            .args(self.view(scene)?.split_whitespace())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(log)

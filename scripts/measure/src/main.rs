@@ -40,6 +40,10 @@ enum What {
     Compare { truth: PathBuf, test: PathBuf },
 }
 
+/// Small pictures of a whole view have pixels so coarse that the noise is filtered away under them, which no large
+/// picture shows.
+const ZOOM: f64 = 3.0;
+
 /// What every measurement needs.
 #[derive(Args, Clone)]
 struct Common {
@@ -52,6 +56,10 @@ struct Common {
     /// Size of the pictures
     #[arg(long, value_name = "WxH")]
     size: Option<String>,
+    /// Shows the middle of each view so many times larger: a small picture then has pixels as fine as a large one's
+    /// [default: 3; with --full 1]
+    #[arg(long, value_name = "Z")]
+    zoom: Option<f64>,
     /// Samples a pixel of a reference picture
     #[arg(long, value_name = "N")]
     spp: Option<u32>,
@@ -87,11 +95,15 @@ impl Common {
     }
 
     fn engine(&self, name: &str) -> Result<Engine> {
+        let zoom = self.zoom.unwrap_or(if self.full { 1.0 } else { ZOOM });
+        if !(0.5..=60.0).contains(&zoom) {
+            bail!("--zoom {zoom}: takes a number from 0.5 to 60");
+        }
         if !self.headless.is_file() {
             bail!("--headless {}: there is no such file", self.headless.display());
         }
         let out = self.out.clone().unwrap_or_else(|| self.repository.join("target").join(name));
-        Ok(Engine { headless: self.headless.clone(), out })
+        Ok(Engine { headless: self.headless.clone(), out, zoom })
     }
 
     fn recipe(&self, small: u32, full: u32) -> Result<Recipe> {

@@ -35,6 +35,11 @@ pub fn maybe(value: Option<f64>) -> String {
     value.map_or_else(|| "–".to_owned(), number)
 }
 
+/// What a zoom means for the pictures, as part of a sentence.
+pub fn zoomed(zoom: f64) -> String {
+    if zoom == 1.0 { String::new() } else { format!(" (the middle of each view, {zoom} times larger)") }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -117,7 +117,8 @@ impl Recipe {
 
     /// A number that changes with everything the picture depends on.
     fn key(&self, engine: &Engine, scene: &str, size: &str, options: &str) -> Result<u64> {
-        let mut settings = engine.effective(&format!("--scene {scene} --size {size} {options}"))?;
+        let mut settings =
+            engine.effective(&format!("--scene {scene} --size {size} {options} {}", engine.view(scene)?))?;
         if !self.is_stand_in() {
             forget_march(&mut settings);
         }

@@ -12,7 +12,7 @@ use serde_json::{Value, json};
 
 use crate::{
     Common,
-    engine::{Cost, Engine, Job},
+    engine::{Cost, Engine, Job, is_software},
     machine::Machine,
     metrics::{Errors, Truth},
     progress::Progress,
@@ -67,6 +67,7 @@ struct SceneResult {
 /// All that a report is written from.
 struct Results {
     size: String,
+    zoom: f64,
     samples: u32,
     /// What stands for the reference, where it is not the path tracer.
     stand_in: Option<String>,
@@ -103,6 +104,7 @@ pub fn run(options: &Options) -> Result<()> {
     let whole = options.scenes.is_empty() && options.only.is_empty() && !recipe.is_stand_in();
     let results = Results {
         size,
+        zoom: engine.zoom,
         samples: recipe.samples,
         stand_in: recipe.is_stand_in().then(|| recipe.quality.clone()),
         rows,
@@ -145,19 +147,27 @@ fn jobs(engine: &Engine, rows: &[Row]) -> Result<Vec<Job>> {
     Ok(jobs)
 }
 
-/// Cost of a job over the mean of High's before and after it.
+/// Cost of a job over High's: the mean of the measurements before and after it, or on a software driver, where other work
+/// only ever adds time, the least of all in the scene.
 fn cost_ratio(engine: &Engine, scene: &str, jobs: &[Job], name: &str) -> Result<Option<f64>> {
     let Some(at) = jobs.iter().position(|job| job.name == name) else { bail!("there is no job {name}") };
+    let own = engine.cost(scene, name)?;
     let is_high = |job: &&Job| !job.picture;
-    let around = [jobs[..at].iter().rev().find(is_high), jobs[at..].iter().find(is_high)];
-    let mut sum = 0.0;
-    let mut count = 0.0;
-    for job in around.into_iter().flatten() {
-        let Some(cost) = engine.cost(scene, &job.name)?.total() else { return Ok(None) };
-        sum += cost;
-        count += 1.0;
-    }
-    Ok(engine.cost(scene, name)?.total().map(|cost| cost * count / sum))
+    let near: Vec<&Job> = if is_software(&own.adapter) {
+        jobs.iter().filter(|job| is_high(job) || job.name == HIGH).collect()
+    } else {
+        let around = [jobs[..at].iter().rev().find(is_high), jobs[at..].iter().find(is_high)];
+        around.into_iter().flatten().collect()
+    };
+    let costs: Vec<Option<f64>> =
+        near.iter().map(|job| Ok(engine.cost(scene, &job.name)?.total())).collect::<Result<_>>()?;
+    let Some(costs) = costs.into_iter().collect::<Option<Vec<f64>>>() else { return Ok(None) };
+    let high = if is_software(&own.adapter) {
+        costs.iter().copied().reduce(f64::min)
+    } else {
+        Some(costs.iter().sum::<f64>() / costs.len() as f64)
+    };
+    Ok(own.total().zip(high).map(|(own, high)| own / high))
 }
 
 fn judge(engine: &Engine, scene: &str, rows: &[Row], jobs: &[Job], truth: &Truth) -> Result<SceneResult> {
@@ -215,7 +225,7 @@ impl Results {
             json!({ "cover": scene.cover, "noise": scene.noise, "rows": rows.collect::<Value>() })
         };
         let scenes: Value = self.scenes.iter().map(|scene| (scene.scene.clone(), found(scene))).collect();
-        json!({ "size": self.size, "samples": self.samples, "stand_in": self.stand_in, "date": self.machine.date,
+        json!({ "size": self.size, "zoom": self.zoom, "samples": self.samples, "stand_in": self.stand_in, "date": self.machine.date,
             "adapter": self.machine.adapter, "commit": self.machine.commit, "scenes": scenes })
     }
 }

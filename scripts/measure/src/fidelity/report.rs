@@ -4,7 +4,7 @@ use std::fmt::Write as _;
 
 use super::{Errors, Found, HIGH, Results, rows::Group};
 use crate::{
-    markdown::{maybe, number, table},
+    markdown::{maybe, number, table, zoomed},
     metrics::{CLOUD_BELOW, FLOOR},
 };
 
@@ -40,7 +40,8 @@ and T error on average (a small one may come out slightly negative). FLIP cannot
 against the mean of the halves, and the noise floor below (FLIP between the halves) says what part of it may be noise: even
 a perfect picture would score roughly half of it.
 
-FLIP depends on the size of the pictures: compare figures of one size only.
+Errors depend on how fine the pixels are: noise is filtered over a pixel, so coarse ones lose the thin parts of clouds. Compare
+figures of one size and zoom only. With zoom, a small picture shows the middle of a view with the pixels of a larger one.
 ";
 
 /// The report.
@@ -91,12 +92,13 @@ fn targets(results: &Results) -> String {
 fn measured_on(results: &Results) -> String {
     let machine = &results.machine;
     format!(
-        "\nMeasured {} at commit {} on {}, {}: pictures of {}, {} samples a pixel in each reference, {} min {} s in all. {}\n",
+        "\nMeasured {} at commit {} on {}, {}: pictures of {}{}, {} samples a pixel in each reference, {} min {} s in all. {}\n",
         machine.date,
         machine.commit,
         machine.adapter,
         machine.processor,
         results.size,
+        zoomed(results.zoom),
         results.samples,
         results.seconds / 60,
         results.seconds % 60,
