@@ -1,5 +1,6 @@
 # shellcheck shell=bash
 # What scripts/fidelity and scripts/ladder share. Sourced after lib.sh, never run.
+# shellcheck disable=SC2034,SC2154 # variables of lib.sh and of the scripts
 
 measure_options="  --no-install     install nothing; where something is missing, name it and exit with status 3
   --full           1920x1080 and more samples: for a GPU
@@ -29,7 +30,7 @@ measure() {
     for arg in "$@"; do
         if [ "$arg" = --no-install ]; then no_install=true; else args+=("$arg"); fi
     done
-    cd "$repo_root"
+    cd "$repo_root" || die "there is no $repo_root"
     set_up ensure_cxx
     say "building the renderer (the first time Bevy is compiled as well, which takes a while) and the tool"
     run_cargo build --example headless "${features[@]}"
