@@ -22,6 +22,13 @@ pub struct Options {
     /// Print the names of scenes, presets and settable paths, one a line
     #[arg(long)]
     pub list: bool,
+    /// Print every setting that the other options amount to, as JSON, and render nothing
+    #[arg(long)]
+    pub effective: bool,
+    /// Make many pictures in one go: each line of the file holds the options of one, added to those given here. They
+    /// share scene, size and textures; nothing is quoted, `#` begins a comment
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["list", "effective"])]
+    pub batch: Option<PathBuf>,
     #[command(flatten)]
     pub start: StartOptions,
     /// Show one stage of the clouds instead: coverage_map, type_map, dimensional_profile, eroded_density,
@@ -193,6 +200,11 @@ impl Plan {
         clock.seconds + f64::from(k) * (self.dt + f64::from(clock.speed) * Self::FRAME_SECONDS)
     }
 
+    /// Whether the cloud buffer is read back: to be written, or to be looked at for what a picture hides.
+    pub fn wants_buffer(&self) -> bool {
+        self.out.is_some() || self.cloud.is_some()
+    }
+
     /// The files asked for: option, path and extension.
     pub fn files(&self) -> Vec<(&'static str, &Path, &'static str)> {
         let all = [
@@ -202,6 +214,20 @@ impl Plan {
             ("--timings", &self.timings, "json"),
         ];
         all.into_iter().filter_map(|(option, path, kind)| Some((option, path.as_deref()?, kind))).collect()
+    }
+
+    /// What differs from a plan whose engine is to render this one too, if anything does.
+    pub fn differs_in_setup(&self, other: &Self) -> Option<&'static str> {
+        let same = [
+            ("--scene", self.scene.name == other.scene.name),
+            ("--size", self.size == other.size),
+            ("--no-sky", self.sky == other.sky),
+            ("--msaa", self.msaa == other.msaa),
+            ("the exposure", self.ev100 == other.ev100),
+            ("--debug", self.debug == other.debug),
+            ("a setting of textures", self.settings.textures == other.settings.textures),
+        ];
+        same.into_iter().find_map(|(what, same)| (!same).then_some(what))
     }
 
     /// Everything that decides the picture, for the timings file.

@@ -37,6 +37,8 @@ const READY_WITHIN: Duration = Duration::from_secs(300);
 const BACK_WITHIN: Duration = Duration::from_secs(120);
 /// Frames rendered after everything is ready and before the first that counts.
 const SETTLING_FRAMES: u32 = 4;
+/// The same for a later picture of a batch, whose sky and textures are there.
+const SETTLED_FRAMES: u32 = 2;
 
 /// What came out.
 pub struct Shot {
@@ -57,8 +59,23 @@ struct Caught {
 
 /// Renders the plan.
 pub fn shoot(plan: &Plan) -> Result<Shot> {
-    let mut studio = Studio::build(plan)?;
+    let mut studio = Studio::build(std::slice::from_ref(plan))?;
     if plan.strip.is_empty() { studio.picture(plan) } else { studio.strip(plan) }
+}
+
+/// Renders plans that share scene, size and textures, one after another, and hands each picture on.
+pub fn shoot_many(plans: &[Plan], mut done: impl FnMut(&Plan, &Shot) -> Result<()>) -> Result<()> {
+    let Some(first) = plans.first() else { return Ok(()) };
+    let mut studio = Studio::build(plans)?;
+    studio.make_ready(first, SETTLING_FRAMES)?;
+    for plan in plans {
+        set(studio.app.world_mut(), &plan.settings);
+        studio.pose(plan, 0);
+        studio.make_ready(plan, SETTLED_FRAMES)?;
+        let timings = studio.count_frames(plan)?;
+        done(plan, &studio.shot(plan, timings)?)?;
+    }
+    Ok(())
 }
 
 struct Studio {
@@ -101,7 +118,9 @@ fn engine(plan: &Plan) -> App {
 }
 
 impl Studio {
-    fn build(plan: &Plan) -> Result<Self> {
+    fn build(plans: &[Plan]) -> Result<Self> {
+        let plan = plans.first().ok_or_else(|| anyhow!("there is nothing to render"))?;
+        let wants = |what: fn(&Plan) -> bool| plans.iter().any(what);
         let mut app = engine(plan);
         let world = app.world_mut();
         set(world, plan.strip.first().unwrap_or(&plan.settings));
@@ -115,9 +134,8 @@ impl Studio {
 
         let mut images = world.resource_mut::<Assets<Image>>();
         let target = images.add(Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None));
-        let wanted = plan.out.is_some() || plan.cloud.is_some();
-        let buffer = wanted.then(|| images.add(CloudBuffer::image(width, height)));
-        let noise = plan.noise.is_some().then(|| images.add(CloudNoise::image(width, height)));
+        let buffer = wants(Plan::wants_buffer).then(|| images.add(CloudBuffer::image(width, height)));
+        let noise = wants(|plan| plan.noise.is_some()).then(|| images.add(CloudNoise::image(width, height)));
         let camera = world
             .spawn((
                 common::camera(plan.ev100),
@@ -163,7 +181,7 @@ impl Studio {
     }
 
     /// Renders until textures are baked and pipelines are there, then a few frames more.
-    fn make_ready(&mut self, plan: &Plan) -> Result<()> {
+    fn make_ready(&mut self, plan: &Plan, settling: u32) -> Result<()> {
         let started = Instant::now();
         let stage = Stage::begin("baking textures", 100);
         // Thrown away: it has the screenshot's own pipeline made before frames are timed.
@@ -171,7 +189,7 @@ impl Studio {
             self.app.world_mut().spawn(Screenshot::image(self.target.clone()));
         }
         let mut settled = 0;
-        while settled < SETTLING_FRAMES {
+        while settled < settling {
             ensure!(
                 started.elapsed() < READY_WITHIN,
                 "textures and pipelines were not ready within {} s",
@@ -261,10 +279,12 @@ impl Studio {
             );
         }
         type Slot = fn(&mut Caught) -> &mut Option<Vec<u8>>;
-        let slots: [(_, Slot); 2] =
-            [(&self.buffer, |caught| &mut caught.cloud), (&self.noise, |caught| &mut caught.noise)];
-        let asked = slots.into_iter().filter_map(|(image, slot)| {
-            let mut entity = world.spawn(Readback::texture(image.clone()?));
+        let slots: [(_, _, Slot); 2] = [
+            (plan.wants_buffer(), &self.buffer, |caught| &mut caught.cloud),
+            (plan.noise.is_some(), &self.noise, |caught| &mut caught.noise),
+        ];
+        let asked = slots.into_iter().filter_map(|(wanted, image, slot)| {
+            let mut entity = world.spawn(Readback::texture(image.clone().filter(|_| wanted)?));
             entity.observe(move |read: On<ReadbackComplete>, mut caught: ResMut<Caught>| {
                 slot(&mut caught).get_or_insert_with(|| read.data.clone());
             });
@@ -276,12 +296,12 @@ impl Studio {
     fn is_back(&self, plan: &Plan) -> bool {
         let caught = self.app.world().resource::<Caught>();
         (plan.out.is_none() || caught.picture.is_some())
-            && (self.buffer.is_none() || caught.cloud.is_some())
-            && (self.noise.is_none() || caught.noise.is_some())
+            && (!plan.wants_buffer() || caught.cloud.is_some())
+            && (plan.noise.is_none() || caught.noise.is_some())
     }
 
     fn picture(&mut self, plan: &Plan) -> Result<Shot> {
-        self.make_ready(plan)?;
+        self.make_ready(plan, SETTLING_FRAMES)?;
         let timings = self.count_frames(plan)?;
         self.shot(plan, timings)
     }

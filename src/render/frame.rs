@@ -135,7 +135,7 @@ impl FrameUniform {
                 quality.offsets.into(),
             ),
             layers: UVec4::new(window.layer(), window.leaving_layer(), window.layers(), window.held_before),
-            debug: UVec4::new(input.debug.shader_mode(), window.index, 0, 0),
+            debug: UVec4::new(input.debug.shader_mode(), window.index, quality.seed, 0),
         }
     }
 }

@@ -124,6 +124,9 @@ pub struct CloudQuality {
     /// Frames in the sliding window. Memory is linear in it, time is not. Default 8.
     #[reflect(@1..=16_u32)]
     pub window: u32,
+    /// Random numbers of [`CloudMethod::PathTrace`]: another seed makes another, independent picture. Default 0.
+    #[reflect(@0..=4_294_967_295_u32)]
+    pub seed: u32,
 }
 
 impl Default for CloudQuality {
@@ -183,6 +186,7 @@ impl CloudQuality {
             offsets: true,
             temporal: TemporalMode::SlidingWindow,
             window: 8,
+            seed: 0,
         }
     }
 

@@ -254,7 +254,7 @@ fn directions_follow_the_phase_function() {
             @compute @workgroup_size(64)
             fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
                 if id.x >= {COUNT}u {{ return; }}
-                var rng = seed_rng(vec2(id.x & 255u, id.x >> 8u), 3u);
+                var rng = seed_rng(vec2(id.x & 255u, id.x >> 8u), 3u, 0u);
                 let axis = normalize(vec3(values[0], values[1], values[2]));
                 let params = vec4({x:?}, {y:?}, {z:?}, {w:?});
                 var d: vec3<f32>;
@@ -298,13 +298,15 @@ fn random_numbers_are_uniform_and_streams_do_not_correlate() {
         @compute @workgroup_size(64)
         fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
             if id.x >= {COUNT}u {{ return; }}
-            var rng = seed_rng(vec2(id.x & 127u, id.x >> 7u), u32(values[0]));
+            var rng = seed_rng(vec2(id.x & 127u, id.x >> 7u), u32(values[0]), u32(values[1]));
             for (var k = 0u; k < 4u; k++) {{
                 results[4u * id.x + k] = random(&rng);
             }}
         }}"
     );
-    let frames = [0.0, 1.0].map(|frame| run_compute(&mut app, &source, &[frame], 4 * COUNT, COUNT as u32));
+    let draw = |app: &mut App, sample, seed| run_compute(app, &source, &[sample, seed], 4 * COUNT, COUNT as u32);
+    let [frames, seeds] = [[[0.0, 0.0], [1.0, 0.0]], [[0.0, 0.0], [0.0, 1.0]]]
+        .map(|pair| pair.map(|[sample, seed]| draw(&mut app, sample, seed)));
     let correlation = |a: &dyn Fn(usize) -> f32, b: &dyn Fn(usize) -> f32| -> f64 {
         (0..COUNT - 1).map(|i| (f64::from(a(i)) - 0.5) * (f64::from(b(i)) - 0.5)).sum::<f64>() / COUNT as f64 * 12.0
     };
@@ -322,6 +324,7 @@ fn random_numbers_are_uniform_and_streams_do_not_correlate() {
         assert!(correlation(&|i| values[4 * i], &|i| values[4 * i + 4]).abs() < bound);
     }
     assert!(correlation(&|i| frames[0][4 * i], &|i| frames[1][4 * i]).abs() < bound, "frames are alike");
+    assert!(correlation(&|i| seeds[0][4 * i], &|i| seeds[1][4 * i]).abs() < bound, "seeds are alike");
 }
 
 #[test]
