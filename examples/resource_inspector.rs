@@ -3,9 +3,10 @@
 //! They are ordinary reflected resources, so whatever shows resources shows these. What is out of its range is reported
 //! in the log, and the last good value stays.
 use bevy::light::{Atmosphere, atmosphere::ScatteringMedium, light_consts::lux};
-use bevy::{camera::Exposure, pbr::AtmosphereSettings, prelude::*};
+use bevy::{camera::Exposure, pbr::AtmosphereSettings, prelude::*, reflect::Typed};
 use bevy_cumulus::prelude::*;
-use bevy_inspector_egui::{bevy_egui::EguiPlugin, quick::ResourceInspectorPlugin};
+use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
+use bevy_inspector_egui::quick::ResourceInspectorPlugin;
 
 fn main() {
     let title = "bevy_cumulus: resource inspector".to_owned();
@@ -13,16 +14,40 @@ fn main() {
     App::new()
         .add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }))
         .add_plugins((CloudsPlugin, EguiPlugin::default()))
+        // The inspector counts on these. Bevy's feature `reflect_auto_register`, one of its defaults, does it as well.
+        .register_type::<Name>()
+        .register_type::<bevy::render::view::ColorGrading>()
         .add_plugins((
-            ResourceInspectorPlugin::<CloudModel>::default(),
-            ResourceInspectorPlugin::<CloudLighting>::default(),
-            ResourceInspectorPlugin::<CloudQuality>::default(),
-            ResourceInspectorPlugin::<CloudTextures>::default(),
-            ResourceInspectorPlugin::<CloudTextureSlots>::default(),
-            ResourceInspectorPlugin::<CloudClock>::default(),
+            inspector::<CloudModel>([8.0, 8.0], [290.0, 300.0]),
+            inspector::<CloudLighting>([8.0, 370.0], [290.0, 300.0]),
+            inspector::<CloudQuality>([960.0, 8.0], [290.0, 300.0]),
+            inspector::<CloudTextures>([960.0, 370.0], [290.0, 300.0]),
+            inspector::<CloudTextureSlots>([330.0, 520.0], [290.0, 150.0]),
+            inspector::<CloudClock>([650.0, 520.0], [270.0, 150.0]),
         ))
         .add_systems(Startup, setup)
         .run();
+}
+
+/// A window over the resource, at this place and of this size.
+///
+/// `ResourceInspectorPlugin` alone will do, but opens its window as small as can be. Egui remembers windows by their
+/// titles, so one that is drawn before it leaves place and size to it.
+fn inspector<R>(place: [f32; 2], size: [f32; 2]) -> impl Fn(&mut App)
+where
+    R: Resource<Mutability = bevy::ecs::component::Mutable> + Reflect + Typed,
+{
+    let first = move |mut contexts: EguiContexts| -> Result {
+        egui::Window::new(R::type_ident().unwrap_or_default())
+            .default_pos(place)
+            .default_size(size)
+            .show(contexts.ctx_mut()?, |ui| ui.allocate_space(ui.available_size()));
+        Ok(())
+    };
+    move |app: &mut App| {
+        app.add_systems(EguiPrimaryContextPass, first.run_if(run_once))
+            .add_plugins(ResourceInspectorPlugin::<R>::default().run_if(not(run_once)));
+    }
 }
 
 fn setup(mut commands: Commands, mut media: ResMut<Assets<ScatteringMedium>>) {
