@@ -33,7 +33,7 @@ pub struct Shown<'w, 's> {
 /// Size of the whole overlay in a window that has room for it (points), without its lines.
 const MARGINS: egui::Vec2 = egui::vec2(350.0, 40.0);
 /// Height of a line.
-const LINE: f32 = 18.0;
+const LINE: f32 = 19.0;
 /// Text smaller than this share of the normal size is hard to read.
 const SMALLEST: f32 = 0.75;
 /// Windows narrower than this have no room for help and panel side by side.
