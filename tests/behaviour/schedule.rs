@@ -79,7 +79,7 @@ fn passes_run_after_the_scene_and_before_tone_mapping() {
         "::main_opaque_pass_3d",
         "::main_transparent_pass_3d",
         "::cloud_sky",
-        "::cloud_march",
+        "::cloud_light",
         "::cloud_accumulate",
         "::cloud_composite",
         "::tonemapping",

@@ -76,7 +76,8 @@ fn no_setting_compiles_anything_or_takes_the_clouds_away() {
     };
     let before = pipelines(&app);
     let mut worst = BTreeMap::<String, (f64, String)>::new();
-    for path in start.paths() {
+    // Another method is another renderer, compiled when it is first asked for.
+    for path in start.paths().into_iter().filter(|path| path != "quality.method") {
         let mut tried = 0;
         for value in VALUES {
             let mut settings = start.clone();

@@ -84,32 +84,33 @@ fn keys_change_the_sky() {
     screen.wait_for("P to bring another preset", |now| now.differs(&before, SKY) > 8.0);
 }
 
-/// Waits until this part stays as it is: an animation has ended.
+/// Waits until this part stays as it is: an animation has ended. For longer than a slow frame takes.
 fn still(screen: &mut Screen, part: Part) {
     let (mut last, mut times) = (screen.picture(), 0);
     screen.wait_for(&format!("{part:?} to stay as it is"), |now| {
-        sleep(Duration::from_millis(200));
+        sleep(Duration::from_millis(300));
         times = if now.differs(&last, part) == 0.0 { times + 1 } else { 0 };
         last = now.clone();
-        times == 3
+        times == 6
     });
 }
 
 /// Folds a group of the panel, or unfolds it.
-fn fold(screen: &mut Screen, title: [usize; 2]) {
+fn fold(screen: &mut Screen, [x, y]: [usize; 2]) {
+    // Titles move while another group folds, and change when pointed at.
+    screen.act(&["mousemove", &x.to_string(), &y.to_string()]);
+    still(screen, PANEL);
+    let triangle = [250, y - 7, 264, y + 7];
     let before = screen.picture();
     let mut clicked = None::<Instant>;
     wait("a group to fold", PATIENCE, || {
         screen.check();
-        if clicked.is_none_or(|last| last.elapsed() > Duration::from_secs(10)) {
-            screen.click(title);
+        if clicked.is_none_or(|last| last.elapsed() > Duration::from_secs(20)) {
+            screen.click([x, y]);
             clicked = Some(Instant::now());
         }
-        // More than the scroll bar.
-        (screen.picture().differs(&before, PANEL) > 1.0).then_some(())
+        (screen.picture().differs(&before, triangle) > 1.0).then_some(())
     });
-    // The clock's numbers run; an animation ends.
-    sleep(Duration::from_millis(700));
 }
 
 #[test]
@@ -123,6 +124,7 @@ fn keys_change_quality_and_clock_as_the_panel_shows() {
     // Folded, each group's title is 21 pixels below the one before; between the second and the third is one more row.
     let [preset, modelling, sampling, clock] = [0, 1, 4, 5].map(|row| [275, 50 + 21 * row]);
     [preset, modelling, sampling].into_iter().for_each(|group| fold(&mut screen, group));
+    still(&mut screen, PANEL);
     for key in ["2", "3", "4", "1"] {
         screen.press(key, PANEL);
         still(&mut screen, PANEL);
