@@ -61,7 +61,8 @@ pub enum Integration {
     /// Exact for a constant medium within the step, whatever its length (thesis, equation 8); the default.
     #[default]
     EnergyConserving,
-    /// `L·σs·Δ` weighted by the transmittance at the step's start: too bright for long steps. For comparison.
+    /// `L·σs·Δ` weighted by the transmittance at the step's end (thesis 4.3, figure 5.11): too dark for long steps. For
+    /// comparison.
     Naive,
 }
 

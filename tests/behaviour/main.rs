@@ -22,6 +22,7 @@ mod settings;
 mod shaders;
 mod slab;
 mod stage;
+mod stall;
 mod textures;
 mod twins;
 mod view;
