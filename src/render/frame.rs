@@ -84,6 +84,7 @@ impl FrameUniform {
         // Settings are validated before they get here, so the fallback is never seen.
         let phase = Phase::from_settings(lighting).unwrap_or(Phase::Isotropic);
         let (kind, phase_params) = phase.shader_parameters();
+        let [diffuse @ .., first_eccentricity] = diffusion(lighting, &phase);
         let held = if quality.is_path_traced() { window.index + 1 } else { window.held_after() };
         Self {
             view_from_clip: input.clip_from_view.inverse(),
@@ -97,10 +98,10 @@ impl FrameUniform {
                 lighting.eccentricity,
                 lighting.phase_limit,
             ),
-            diffusion: diffusion(lighting, &phase),
+            diffusion: diffuse.into(),
             ambient: (lighting.ambient_tint * lighting.ambient_strength).extend(lighting.powder),
             ground_albedo: lighting.ground_albedo.extend(0.0),
-            sky_fallback: lighting.sky_fallback.extend(0.0),
+            sky_fallback: lighting.sky_fallback.extend(first_eccentricity),
             steps: Vec4::new(quality.step, quality.step_growth, quality.light_step, quality.light_growth),
             limits: Vec4::new(
                 quality.transmittance_stop,
@@ -140,9 +141,18 @@ impl FrameUniform {
     }
 }
 
-/// Strength and fall of the diffusion term; single scattering alone (one octave) has none.
-fn diffusion(lighting: &CloudLighting, phase: &Phase) -> Vec4 {
-    let strength = if lighting.octaves > 1 { lighting.diffusion } else { 0.0 };
+/// Strength, fall with optical depth and asymmetry of the diffuse light, and factors on optical depth and asymmetry of
+/// the first octave. Single scattering alone (one octave), or the octaves alone (no diffusion), are the thesis's.
+fn diffusion(lighting: &CloudLighting, phase: &Phase) -> [f32; 5] {
     let fall = 0.75 * (1.0 - phase.mean_cosine() as f32);
-    Vec4::new(strength, fall, 0.0, 0.0)
+    if lighting.octaves <= 1 || lighting.diffusion == 0.0 {
+        return [0.0, fall, 0.0, 1.0, 1.0];
+    }
+    // Light in the diffraction peak hardly turns: it reaches deeper, and leaves a little wider. Both shares are fitted to
+    // the path tracer.
+    let peak = match phase {
+        Phase::HgDraine(droplets) => 1.0 - droplets.w as f32,
+        _ => 0.0,
+    };
+    [lighting.diffusion, fall, lighting.diffusion_asymmetry, 1.0 - 0.6 * peak, 1.0 - 0.02 * peak]
 }

@@ -56,7 +56,7 @@ pub(crate) fn cloud_sky(view: ViewQuery<&CloudBindGroups>, cache: Res<PipelineCa
         &mut ctx,
         "cloud_sky",
         cache.get_compute_pipeline(*id),
-        [(&groups.air, &groups.air_offsets), (&groups.empty, &[]), (own, &[])],
+        [(&groups.air, &groups.air_offsets), (&groups.model, &[]), (own, &[])],
         UVec2::ONE,
     );
 }

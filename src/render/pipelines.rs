@@ -245,7 +245,7 @@ impl CloudPipelines {
         });
         let march = compute("cloud_march", 1, [air, &model.layout, &self.march[ms]]);
         let made = Pipelines {
-            sky: compute("cloud_sky", 0, [air, &self.empty, &self.sky]),
+            sky: compute("cloud_sky", 0, [air, &model.layout, &self.sky]),
             march,
             plain_march: march,
             accumulate: compute("cloud_accumulate", 2, [&self.empty, &self.empty, &self.accumulate]),

@@ -26,24 +26,28 @@ pub enum PhaseFunction {
 #[serde(default, deny_unknown_fields)]
 pub struct CloudLighting {
     /// Terms N of the multiple-scattering sum (thesis, 3.8): 1 is single scattering, 0 no sunlight. Each costs
-    /// one exponential a sample. Default 8.
+    /// one exponential a sample. Default 3.
     #[reflect(@0..=16_u32)]
     pub octaves: u32,
-    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.6.
+    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.35.
     #[reflect(@0.0..=1.0_f32)]
     pub attenuation: f32,
     /// b: factor on the contribution from one octave to the next; at most `attenuation` keeps energy
-    /// bounded. Default 0.6.
+    /// bounded. Default 0.18.
     #[reflect(@0.0..=1.0_f32)]
     pub contribution: f32,
-    /// c: factor on the phase function's asymmetry from one octave to the next (Wrenninge). Default 0.5.
+    /// c: factor on the phase function's asymmetry from one octave to the next (Wrenninge). Default 0.24.
     #[reflect(@0.0..=1.0_f32)]
     pub eccentricity: f32,
-    /// Strength of a diffusion term for the orders of scattering that the octaves lose, with two octaves or more:
-    /// fluence inside a bright cloud, in units of the sun's illuminance (two-stream theory: about 2 at the lit
-    /// side). It falls as 1/(1 + ¾(1 − ⟨cosθ⟩)τ). 0 is the thesis alone. Default 1.2.
-    #[reflect(@0.0..=10.0_f32)]
+    /// Strength of the sun's light that has been scattered so often that it diffuses, which the octaves lose (with two
+    /// octaves or more): radiance at the lit side, in units of the sun's illuminance over 4π. Inside it is weighed
+    /// against sky and ground by the optical depth to each; costs five samples of the medium. 0 is the thesis alone.
+    /// Default 8, fitted to the path tracer.
+    #[reflect(@0.0..=40.0_f32)]
     pub diffusion: f32,
+    /// Asymmetry of that light: how much of it goes on away from the sun (0 all ways alike). Default 0.38, fitted.
+    #[reflect(@0.0..=0.9_f32)]
+    pub diffusion_asymmetry: f32,
     /// The phase function. Default [`PhaseFunction::HgDraine`].
     pub phase: PhaseFunction,
     /// Asymmetry of Henyey–Greenstein and of the forward lobe (−1 back, 1 forward). Default 0.8.
@@ -59,14 +63,14 @@ pub struct CloudLighting {
     #[reflect(@5.0..=50.0_f32)]
     pub droplet_diameter: f32,
     /// Upper bound of a phase value (1/sr). The diffraction peak of real droplets reaches 10²…10⁴ within a
-    /// degree of the sun and would alias. What is cut there is lost: at 12 µm and 30, 28 % of single scattering,
-    /// all of it within 1.6° of the sun. Default 30.
+    /// degree of the sun and would alias. What is cut there is lost: at 12 µm 2 % of single scattering with the
+    /// default, 28 % (all within 1.6° of the sun) with 30. Default 500.
     #[reflect(@0.1..=100_000.0_f32)]
     pub phase_limit: f32,
     /// Factor on the sun's illuminance. Default 1: as the scene's light says.
     #[reflect(@0.0..=100.0_f32)]
     pub sun_strength: f32,
-    /// Factor on the ambient light (sky from above, ground from below). Default 1.
+    /// Factor on the ambient light (sky from above, ground from below). Default 1.15, fitted.
     #[reflect(@0.0..=100.0_f32)]
     pub ambient_strength: f32,
     /// Tint of the ambient light, linear RGB. Default white.
@@ -93,19 +97,20 @@ pub struct CloudLighting {
 impl Default for CloudLighting {
     fn default() -> Self {
         Self {
-            octaves: 8,
-            attenuation: 0.6,
-            contribution: 0.6,
-            eccentricity: 0.5,
-            diffusion: 1.2,
+            octaves: 3,
+            attenuation: 0.35,
+            contribution: 0.18,
+            eccentricity: 0.24,
+            diffusion: 8.0,
+            diffusion_asymmetry: 0.38,
             phase: PhaseFunction::HgDraine,
             g: 0.8,
             g_back: -0.3,
             lobe_mix: 0.3,
             droplet_diameter: 12.0,
-            phase_limit: 30.0,
+            phase_limit: 500.0,
             sun_strength: 1.0,
-            ambient_strength: 1.0,
+            ambient_strength: 1.15,
             ambient_tint: Vec3::ONE,
             sky_fallback: Vec3::new(0.026, 0.037, 0.055),
             ground_albedo: Vec3::new(0.2, 0.2, 0.18),

@@ -32,12 +32,13 @@ const SOURCES: [&str; 7] = [
 const ALL_SOURCES: [&str; 2] = ["src", "examples/common"];
 
 /// Settings of the lighting that only the march has.
-const MARCH_ONLY: [&str; 9] = [
+const MARCH_ONLY: [&str; 10] = [
     "octaves",
     "attenuation",
     "contribution",
     "eccentricity",
     "diffusion",
+    "diffusion_asymmetry",
     "phase_limit",
     "ambient_strength",
     "ambient_tint",
