@@ -185,6 +185,7 @@ fn view_bind_groups(
     let (air, air_offsets) = air.unwrap_or_else(|| (empty.clone(), Vec::new()));
     let frame = item.uniforms.frame.binding()?;
     let world_from_local = item.uniforms.world_from_local.binding()?;
+    let held = item.uniforms.held.binding()?;
     let history = item.history;
     let group = |label: &'static str, descriptor: &BindGroupLayoutDescriptor, entries: &[BindGroupEntry]| {
         device.create_bind_group(label, &layout(descriptor), entries)
@@ -200,6 +201,9 @@ fn view_bind_groups(
             history.newest(),
             &history.distances,
             world_from_local.clone(),
+            history.marched_before(),
+            history.marched_now(),
+            held.clone(),
         )),
     );
     let resolved = BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth));
@@ -229,7 +233,14 @@ fn view_bind_groups(
             group(
                 "cloud_accumulate",
                 &pipelines.accumulate,
-                &BindGroupEntries::sequential((frame, &history.frames_view, history.sum_before(), history.sum_after())),
+                &BindGroupEntries::sequential((
+                    frame,
+                    &history.frames_view,
+                    history.sum_before(),
+                    history.sum_after(),
+                    &history.marched_view,
+                    held,
+                )),
             ),
         ),
         composite: (ids.composite, group("cloud_composite", &pipelines.composite[ms], &resolved)),

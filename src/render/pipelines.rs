@@ -14,7 +14,7 @@ use bevy::{
     render::render_resource::{binding_types::*, *},
 };
 
-use super::frame::FrameUniform;
+use super::{frame::FrameUniform, reproject::HeldUniform};
 use crate::{model::ModelBindings, settings::DebugShader};
 
 /// What a stage's pipeline depends on.
@@ -94,6 +94,9 @@ impl FromWorld for CloudPipelines {
                         write(TextureFormat::Rgba16Float),
                         write(TextureFormat::Rg32Float),
                         uniform_buffer::<Mat4>(false),
+                        texture_2d(TextureSampleType::Uint),
+                        write(TextureFormat::R32Uint),
+                        uniform_buffer::<HeldUniform>(false),
                     ),
                 ),
             )
@@ -152,7 +155,14 @@ impl FromWorld for CloudPipelines {
                 "cloud_accumulate",
                 &BindGroupLayoutEntries::sequential(
                     compute,
-                    (frame(), texture_2d_array(unfiltered), texture_2d(unfiltered), write(TextureFormat::Rgba32Float)),
+                    (
+                        frame(),
+                        texture_2d_array(unfiltered),
+                        texture_2d(unfiltered),
+                        write(TextureFormat::Rgba32Float),
+                        texture_2d_array(TextureSampleType::Uint),
+                        uniform_buffer::<HeldUniform>(false),
+                    ),
                 ),
             ),
             composite: [composite(false), composite(true)],

@@ -165,16 +165,16 @@ fn camera(app: &mut App, watched: &Watched) -> Entity {
 /// Whatever makes held frames wrong. Each changes what it finds.
 const CHANGES: [Change; 13] = [
     ("reset", start_over_change),
-    ("the camera moved", |app, w| {
+    ("the camera leapt", |app, w| {
         let camera = camera(app, w);
-        app.world_mut().get_mut::<Transform>(camera).expect("a camera").translation.x += 40.0;
+        app.world_mut().get_mut::<Transform>(camera).expect("a camera").translation.x += 400.0;
     }),
-    ("the camera turned", |app, w| {
+    ("the camera turned away", |app, w| {
         let camera = camera(app, w);
-        app.world_mut().get_mut::<Transform>(camera).expect("a camera").rotate_y(0.05);
+        app.world_mut().get_mut::<Transform>(camera).expect("a camera").rotate_y(0.6);
     }),
     ("the lens changed", |app, w| {
-        let lens = PerspectiveProjection { fov: 0.7, ..default() };
+        let lens = PerspectiveProjection { fov: 0.5, ..default() };
         let camera = camera(app, w);
         app.world_mut().entity_mut(camera).insert(Projection::Perspective(lens));
     }),
