@@ -64,7 +64,7 @@ pub mod prelude {
         settings::{
             CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings,
             CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution, PhaseFunction,
-            TemporalMode,
+            TemporalMode, UpscaleBlock,
         },
     };
 }

@@ -199,7 +199,7 @@ fn view_bind_groups(
             textures.blue_noise.as_ref()?,
             depth,
             history.newest(),
-            &history.distances,
+            history.marched_distances(),
             world_from_local.clone(),
             history.marched_before(),
             history.marched_now(),
@@ -217,6 +217,35 @@ fn view_bind_groups(
         ));
         (ids.publish, group("cloud_publish", &pipelines.publish[ms], &entries))
     });
+    // One of two ways to make a picture of the frames.
+    let accumulate = match history.marched_after() {
+        Some(marched_after) => {
+            let entries = BindGroupEntries::sequential((
+                frame.clone(),
+                &history.frames_view,
+                history.sum_before(),
+                depth,
+                &history.marched_view,
+                held,
+                history.marched_before(),
+                history.sum_after(),
+                marched_after,
+                &history.distances,
+            ));
+            (ids.blend, group("cloud_blend", &pipelines.blend[ms], &entries))
+        }
+        None => {
+            let entries = BindGroupEntries::sequential((
+                frame.clone(),
+                &history.frames_view,
+                history.sum_before(),
+                history.sum_after(),
+                &history.marched_view,
+                held,
+            ));
+            (ids.accumulate, group("cloud_accumulate", &pipelines.accumulate, &entries))
+        }
+    };
     let groups = CloudBindGroups {
         model: model.bind_group(device, cache, &item.uniforms.model, textures)?,
         sky: (
@@ -224,25 +253,11 @@ fn view_bind_groups(
             group(
                 "cloud_sky",
                 &pipelines.sky,
-                &BindGroupEntries::sequential((frame.clone(), sky_light.as_entire_binding(), world_from_local)),
+                &BindGroupEntries::sequential((frame, sky_light.as_entire_binding(), world_from_local)),
             ),
         ),
         march: (ids.drawable_march(cache), march),
-        accumulate: (
-            ids.accumulate,
-            group(
-                "cloud_accumulate",
-                &pipelines.accumulate,
-                &BindGroupEntries::sequential((
-                    frame,
-                    &history.frames_view,
-                    history.sum_before(),
-                    history.sum_after(),
-                    &history.marched_view,
-                    held,
-                )),
-            ),
-        ),
+        accumulate,
         composite: (ids.composite, group("cloud_composite", &pipelines.composite[ms], &resolved)),
         publish,
         air,

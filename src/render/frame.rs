@@ -7,7 +7,7 @@ use crate::{
     model::TangentFrame,
     reference::phase::Phase,
     settings::{CloudDebugView, CloudLighting, CloudQuality, Integration},
-    textures::n_rooks::n_rooks,
+    textures::n_rooks::{MAX_WINDOW, n_rooks},
 };
 
 /// The brightest directional light.
@@ -77,10 +77,6 @@ impl FrameUniform {
         let FrameInput { space, sun, quality, lighting, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();
         let size = marched_size(*viewport, quality);
-        let rooks = n_rooks(window.window as usize);
-        let slot = window.index % window.window;
-        let rook = rooks[slot as usize % rooks.len()];
-        let stratum = 1.0 / window.window as f32;
         // Settings are validated before they get here, so the fallback is never seen.
         let phase = Phase::from_settings(lighting).unwrap_or(Phase::Isotropic);
         let (kind, phase_params) = phase.shader_parameters();
@@ -108,7 +104,7 @@ impl FrameUniform {
                 // smoothstep is undefined where both edges meet.
                 quality.max_distance * lighting.fade_start.min(0.999),
             ),
-            offsets: Vec4::new(rook[0], rook[1], slot as f32 * stratum, stratum),
+            offsets: offsets(quality, *window),
             camera: Vec4::new(
                 space.altitude as f32,
                 space.radius as f32,
@@ -139,9 +135,45 @@ impl FrameUniform {
     }
 }
 
+/// Where this frame samples pixel and step.
+fn offsets(quality: &CloudQuality, window: FrameInWindow) -> Vec4 {
+    if quality.carries_picture() {
+        // There is no window whose frames could share a step out: van der Corput's sequence fills it (Högfeldt 6.1).
+        let sample = window.index / quality.block_side().pow(2);
+        let [x, y] = n_rooks(MAX_WINDOW)[sample as usize % MAX_WINDOW];
+        return Vec4::new(x, y, van_der_corput(sample), 1.0);
+    }
+    let rooks = n_rooks(window.window as usize);
+    let slot = window.index % window.window;
+    let [x, y] = rooks[slot as usize % rooks.len()];
+    let stratum = 1.0 / window.window as f32;
+    Vec4::new(x, y, slot as f32 * stratum, stratum)
+}
+
+/// The binary digits of `i` mirrored at the point: 0, ½, ¼, ¾, ... No more than 16 of them, so that f32 holds it.
+fn van_der_corput(i: u32) -> f32 {
+    (i.reverse_bits() >> 16) as f32 / 65_536.0
+}
+
 /// Strength and fall of the diffusion term; single scattering alone (one octave) has none.
 fn diffusion(lighting: &CloudLighting, phase: &Phase) -> Vec4 {
     let strength = if lighting.octaves > 1 { lighting.diffusion } else { 0.0 };
     let fall = 0.75 * (1.0 - phase.mean_cosine() as f32);
     Vec4::new(strength, fall, 0.0, 0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn van_der_corput_fills_the_step_evenly() {
+        assert_eq!([0, 1, 2, 3, 4].map(van_der_corput), [0.0, 0.5, 0.25, 0.75, 0.125]);
+        // Any run of eight hits each eighth once.
+        for start in 0..40 {
+            let mut eighths: Vec<u32> = (start..start + 8).map(|i| (van_der_corput(i) * 8.0) as u32).collect();
+            eighths.sort_unstable();
+            assert_eq!(eighths, [0, 1, 2, 3, 4, 5, 6, 7], "from {start}");
+        }
+    }
 }

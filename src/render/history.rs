@@ -8,7 +8,7 @@ use bevy::{
     render::{render_resource::*, renderer::RenderDevice},
 };
 
-use super::reproject::{HeldUniform, Pose};
+use super::reproject::{HeldUniform, Pose, Sparse};
 
 /// Where the coming frame stands in the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +57,14 @@ pub(crate) struct HistoryKey {
     pub msaa: u32,
 }
 
+/// What only a picture that is carried on needs.
+struct Carried {
+    /// How far its texels were marched, as `pack_marched` in `held.wesl` puts it: by frame, in turn.
+    marched: [TextureView; 2],
+    /// Distances of the frame as marched; those of the picture are resolved with it.
+    scratch: TextureView,
+}
+
 /// A view's textures and place in its window. Lives on the view's render entity.
 #[derive(Component)]
 pub(crate) struct CloudHistory {
@@ -73,6 +81,7 @@ pub(crate) struct CloudHistory {
     pub marched_view: TextureView,
     marched_layers: Vec<TextureView>,
     sums: [TextureView; 2],
+    carried: Option<Carried>,
     /// Mean cloud distance and marched limit (m) of the newest frame.
     pub distances: TextureView,
 }
@@ -106,6 +115,10 @@ impl CloudHistory {
             held: VecDeque::with_capacity(frame.layers() as usize),
             sums: [0, 1].map(|_| whole(texture("cloud_sum", TextureFormat::Rgba32Float, 1))),
             distances: whole(texture("cloud_distances", TextureFormat::Rg32Float, 1)),
+            carried: key.quality.carries_picture().then(|| Carried {
+                marched: [0, 1].map(|_| whole(texture("cloud_picture_marched", TextureFormat::R32Uint, 1))),
+                scratch: whole(texture("cloud_scratch", TextureFormat::Rg32Float, 1)),
+            }),
             frames,
             key,
             pose,
@@ -115,7 +128,8 @@ impl CloudHistory {
 
     /// Goes on to the next frame, or starts over where something changed or the last frame was not drawn.
     pub fn advance(&mut self, device: &RenderDevice, key: HistoryKey, pose: Pose, drawn: bool) {
-        if key.size != self.key.size || key.window != self.key.window {
+        let carries = key.quality.carries_picture();
+        if key.size != self.key.size || key.window != self.key.window || carries != self.carried.is_some() {
             *self = Self::new(device, key, pose);
             return;
         }
@@ -140,7 +154,18 @@ impl CloudHistory {
     /// Where the frames held before this one saw what this one sees.
     pub fn held_uniform(&self) -> HeldUniform {
         let still = self.held.front().is_some_and(|before| self.pose.stands_still(before, self.key.window));
-        HeldUniform::new(&self.pose, self.held.iter(), still)
+        HeldUniform::new(&self.pose, self.held.iter(), still, self.sparse(), self.key.quality.samples_kept())
+    }
+
+    /// Which texels this frame marches.
+    fn sparse(&self) -> Sparse {
+        Sparse::new(self.key.quality.block_side(), self.frame.index)
+    }
+
+    /// Rays along each side that cover what this frame marches.
+    pub fn rays(&self) -> UVec2 {
+        let side = self.key.quality.block_side();
+        (self.key.size + side - 1) / side
     }
 
     /// Marched size.
@@ -159,10 +184,21 @@ impl CloudHistory {
     pub fn marched_now(&self) -> &TextureView {
         &self.marched_layers[self.frame.layer() as usize]
     }
-    /// How far the last frame's were; another layer than this frame's even where there was none.
+    /// How far the last picture's were; another texture than this frame's even where there was none.
     pub fn marched_before(&self) -> &TextureView {
+        if let Some(carried) = &self.carried {
+            return &carried.marched[(self.frame.index & 1) as usize];
+        }
         let layers = self.frame.layers();
         &self.marched_layers[((self.frame.layer() + layers - 1) % layers) as usize]
+    }
+    /// How far the texels of the picture with this frame are, where one is carried on.
+    pub fn marched_after(&self) -> Option<&TextureView> {
+        Some(&self.carried.as_ref()?.marched[(self.frame.index & 1 ^ 1) as usize])
+    }
+    /// Where the march writes distances.
+    pub fn marched_distances(&self) -> &TextureView {
+        self.carried.as_ref().map_or(&self.distances, |carried| &carried.scratch)
     }
     /// The sum before this frame.
     pub fn sum_before(&self) -> &TextureView {

@@ -70,7 +70,7 @@ pub(crate) fn cloud_march(
         "cloud_march",
         cache.get_compute_pipeline(*id),
         [(&groups.air, &groups.air_offsets), (&groups.model, &[]), (own, &[])],
-        workgroups(history.size()),
+        workgroups(history.rays()),
     );
 }
 

@@ -47,6 +47,7 @@ pub(crate) struct Pipelines {
     /// The march of finished clouds, shown while a debug view's own is not compiled.
     pub plain_march: CachedComputePipelineId,
     pub accumulate: CachedComputePipelineId,
+    pub blend: CachedComputePipelineId,
     pub composite: CachedRenderPipelineId,
     pub publish: CachedComputePipelineId,
 }
@@ -59,9 +60,10 @@ pub(crate) struct CloudPipelines {
     pub sky: BindGroupLayoutDescriptor,
     pub march: [BindGroupLayoutDescriptor; 2],
     pub accumulate: BindGroupLayoutDescriptor,
+    pub blend: [BindGroupLayoutDescriptor; 2],
     pub composite: [BindGroupLayoutDescriptor; 2],
     pub publish: [BindGroupLayoutDescriptor; 2],
-    shaders: [Handle<Shader>; 5],
+    shaders: [Handle<Shader>; 6],
     fullscreen: FullscreenShader,
     made: HashMap<Variant, Pipelines>,
 }
@@ -97,6 +99,26 @@ impl FromWorld for CloudPipelines {
                         texture_2d(TextureSampleType::Uint),
                         write(TextureFormat::R32Uint),
                         uniform_buffer::<HeldUniform>(false),
+                    ),
+                ),
+            )
+        };
+        let blend = |multisampled| {
+            BindGroupLayoutDescriptor::new(
+                "cloud_blend",
+                &BindGroupLayoutEntries::sequential(
+                    compute,
+                    (
+                        frame(),
+                        texture_2d_array(unfiltered),
+                        texture_2d(unfiltered),
+                        depth_layout(multisampled),
+                        texture_2d_array(TextureSampleType::Uint),
+                        uniform_buffer::<HeldUniform>(false),
+                        texture_2d(TextureSampleType::Uint),
+                        write(TextureFormat::Rgba32Float),
+                        write(TextureFormat::R32Uint),
+                        write(TextureFormat::Rg32Float),
                     ),
                 ),
             )
@@ -165,6 +187,7 @@ impl FromWorld for CloudPipelines {
                     ),
                 ),
             ),
+            blend: [blend(false), blend(true)],
             composite: [composite(false), composite(true)],
             publish: [publish(false), publish(true)],
             shaders: [
@@ -173,6 +196,7 @@ impl FromWorld for CloudPipelines {
                 load_embedded_asset!(world, "accumulate/accumulate.wesl"),
                 load_embedded_asset!(world, "composite/composite.wesl"),
                 load_embedded_asset!(world, "composite/publish.wesl"),
+                load_embedded_asset!(world, "accumulate/blend.wesl"),
             ],
             fullscreen: world.resource::<FullscreenShader>().clone(),
             made: HashMap::default(),
@@ -243,6 +267,7 @@ impl CloudPipelines {
             march,
             plain_march: march,
             accumulate: compute("cloud_accumulate", 2, [&self.empty, &self.empty, &self.accumulate]),
+            blend: compute("cloud_blend", 5, [&self.empty, &self.empty, &self.blend[ms]]),
             composite,
             publish: compute("cloud_publish", 4, [&self.empty, &self.empty, &self.publish[ms]]),
         };
@@ -259,7 +284,7 @@ impl Pipelines {
 
     /// Whether a picture can be drawn: every stage is compiled, be the march that of finished clouds.
     pub fn drawable(self, cache: &PipelineCache) -> bool {
-        [self.sky, self.drawable_march(cache), self.accumulate, self.publish]
+        [self.sky, self.drawable_march(cache), self.accumulate, self.blend, self.publish]
             .iter()
             .all(|id| cache.get_compute_pipeline(*id).is_some())
             && cache.get_render_pipeline(self.composite).is_some()

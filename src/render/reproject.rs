@@ -91,6 +91,30 @@ fn dimmed(a: &Pose, b: &Pose) -> f32 {
     (b.sun.illuminance - a.sun.illuminance).length() / brightness
 }
 
+/// The one texel that is marched of each block.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct Sparse {
+    /// Texels along a block's side.
+    pub side: u32,
+    /// The one of them.
+    pub place: UVec2,
+}
+
+impl Sparse {
+    /// For the frame of this index and a side that is a power of two. In a row of frames each place comes once, and
+    /// neighbours in time are far apart.
+    pub fn new(side: u32, index: u32) -> Self {
+        const PLACES: [UVec2; 4] = [UVec2::ZERO, UVec2::ONE, UVec2::X, UVec2::Y];
+        let mut place = UVec2::ZERO;
+        let (mut rest, mut unit) = (index, side / 2);
+        while unit > 0 {
+            place += unit * PLACES[rest as usize % 4];
+            (rest, unit) = (rest / 4, unit / 2);
+        }
+        Self { side, place }
+    }
+}
+
 /// `Held` of `held.wesl`, field for field.
 #[derive(ShaderType, Clone, Copy, Debug, Default)]
 pub(crate) struct HeldUniform {
@@ -100,14 +124,21 @@ pub(crate) struct HeldUniform {
 }
 
 impl HeldUniform {
-    /// For a frame with this pose after `held` ones, the latest first.
-    pub fn new<'a>(now: &Pose, held: impl ExactSizeIterator<Item = &'a Pose>, still: bool) -> Self {
-        let counts = UVec4::new(held.len() as u32, still.into(), 0, 0);
+    /// For a frame with this pose after `held` ones, the latest first. `march` says which texels are marched.
+    pub fn new<'a>(
+        now: &Pose,
+        held: impl ExactSizeIterator<Item = &'a Pose>,
+        still: bool,
+        march: Sparse,
+        samples_kept: f32,
+    ) -> Self {
+        let counts = UVec4::new(held.len() as u32, still.into(), march.side, march.place.x | march.place.y << 8);
         let mut uniform = Self { counts, ..default() };
+        uniform.terms[0].z = samples_kept;
         for ((matrix, terms), before) in uniform.clip_from_local.iter_mut().zip(&mut uniform.terms).zip(held) {
             *matrix = now.clip_of(before);
             let weight = if now.fits(before) { 1.0 } else { 0.0 };
-            *terms = Vec4::new(weight, now.shift(before).length(), 0.0, 0.0);
+            (terms.x, terms.y) = (weight, now.shift(before).length());
         }
         uniform
     }
@@ -115,11 +146,17 @@ impl HeldUniform {
 
 #[cfg(test)]
 mod tests {
+    use bevy::camera::CameraProjection;
+
     use super::*;
+
+    fn lens(fov: f32) -> Mat4 {
+        PerspectiveProjection { fov, aspect_ratio: 1.5, ..default() }.get_clip_from_view()
+    }
 
     fn pose() -> Pose {
         Pose {
-            clip_from_view: Mat4::perspective_infinite_reverse_rh(1.0, 1.5, 0.1),
+            clip_from_view: lens(1.0),
             position: DVec3::ZERO,
             rotation: Quat::IDENTITY,
             world_from_local: Quat::IDENTITY,
@@ -142,10 +179,23 @@ mod tests {
             Pose { rotation: Quat::from_rotation_y(0.01), ..before },
             Pose { seconds: 1.0, ..before },
             Pose { sun: Sun { direction: Vec3::new(0.01, 1.0, 0.0), ..before.sun }, ..before },
-            Pose { clip_from_view: Mat4::perspective_infinite_reverse_rh(1.1, 1.5, 0.1), ..before },
+            Pose { clip_from_view: lens(1.1), ..before },
         ] {
             assert!(!moved.stands_still(&before, 8), "{moved:?}");
             assert!(!moved.is_cut(&before), "{moved:?}");
+        }
+    }
+
+    #[test]
+    fn every_texel_of_a_block_is_marched_in_turn() {
+        for side in [1, 2, 4] {
+            for start in [0, 5, 48] {
+                let mut seen: Vec<UVec2> = (start..start + side * side).map(|i| Sparse::new(side, i).place).collect();
+                assert!(seen.iter().all(|place| place.max_element() < side));
+                seen.sort_by_key(|place| place.to_array());
+                seen.dedup();
+                assert_eq!(seen.len() as u32, side * side, "side {side} from frame {start}");
+            }
         }
     }
 
@@ -160,7 +210,7 @@ mod tests {
             Pose { sun: Sun { direction: Vec3::X, ..before.sun }, ..before },
             Pose { sun: Sun { direction: Vec3::NEG_Y, ..before.sun }, ..before },
             Pose { sun: Sun { illuminance: Vec3::splat(2.0), ..before.sun }, ..before },
-            Pose { clip_from_view: Mat4::perspective_infinite_reverse_rh(0.5, 1.5, 0.1), ..before },
+            Pose { clip_from_view: lens(0.5), ..before },
         ] {
             assert!(cut.is_cut(&before), "{cut:?}");
         }
@@ -177,12 +227,14 @@ mod tests {
         let exact = before.clip_from_view * (before.rotation.inverse() * was).extend(1.0);
         let local = tilted.inverse() * (cloud - now.position).as_vec3();
         let held = [before];
-        let found = HeldUniform::new(&now, held.iter(), false).clip_from_local[0] * local.extend(1.0);
+        let all = Sparse::new(1, 0);
+        let found = HeldUniform::new(&now, held.iter(), false, all, 8.0).clip_from_local[0] * local.extend(1.0);
         assert!((found / found.w).abs_diff_eq(exact / exact.w, 1e-5), "{found} for {exact}");
         // Far from the origin it is the same, to the bit.
         let far = DVec3::new(1e7, 0.0, -3e6);
         let shifted = [Pose { position: before.position + far, ..before }];
         let now = Pose { position: now.position + far, ..now };
-        assert_eq!(HeldUniform::new(&now, shifted.iter(), false).clip_from_local[0] * local.extend(1.0), found);
+        let matrix = HeldUniform::new(&now, shifted.iter(), false, all, 8.0).clip_from_local[0];
+        assert_eq!(matrix * local.extend(1.0), found);
     }
 }

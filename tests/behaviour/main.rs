@@ -11,6 +11,7 @@ mod gpu;
 mod halves;
 mod headless;
 mod intervals;
+mod motion;
 mod occlusion;
 mod phases;
 mod sampling_patterns;
