@@ -77,6 +77,7 @@ impl FrameUniform {
         let FrameInput { space, sun, quality, lighting, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();
         let size = marched_size(*viewport, quality);
+        let reach = reach(quality, lighting, space);
         // Settings are validated before they get here, so the fallback is never seen.
         let phase = Phase::from_settings(lighting).unwrap_or(Phase::Isotropic);
         let (kind, phase_params) = phase.shader_parameters();
@@ -100,9 +101,9 @@ impl FrameUniform {
             limits: Vec4::new(
                 quality.transmittance_stop,
                 quality.density_skip,
-                quality.max_distance,
+                reach,
                 // smoothstep is undefined where both edges meet.
-                quality.max_distance * lighting.fade_start.min(0.999),
+                reach * lighting.fade_start.min(0.999),
             ),
             offsets: offsets(quality, *window),
             camera: Vec4::new(
@@ -133,6 +134,20 @@ impl FrameUniform {
             debug: UVec4::new(input.debug.shader_mode(), 0, 0, 0),
         }
     }
+}
+
+/// How far is marched (m). From the ground `max_distance`; higher up it grows, so that from space all clouds up to the
+/// planet's rim are nearer than where the fade begins.
+fn reach(quality: &CloudQuality, lighting: &CloudLighting, space: &TangentFrame) -> f32 {
+    /// Where it begins to grow and where all is seen (m).
+    const GROWS: [f32; 2] = [10_000.0, 60_000.0];
+    /// From the horizon to the far side of the highest clouds there are (m).
+    const PAST_HORIZON: f64 = 400_000.0;
+    let altitude = space.altitude.max(0.0);
+    let rim = (altitude * (2.0 * space.radius + altitude)).sqrt() + PAST_HORIZON;
+    let all = rim as f32 / lighting.fade_start.clamp(0.1, 0.999);
+    let share = ((altitude as f32 - GROWS[0]) / (GROWS[1] - GROWS[0])).clamp(0.0, 1.0);
+    quality.max_distance.lerp(all.max(quality.max_distance), share * share)
 }
 
 /// Where this frame samples pixel and step.
@@ -175,5 +190,28 @@ mod tests {
             eighths.sort_unstable();
             assert_eq!(eighths, [0, 1, 2, 3, 4, 5, 6, 7], "from {start}");
         }
+    }
+
+    #[test]
+    fn from_space_no_cloud_before_the_rim_fades() {
+        let lighting = CloudLighting::default();
+        let quality = CloudQuality::default();
+        let at = |altitude: f64| {
+            let r = 6_360_000.0;
+            let space = TangentFrame::below(glam::DVec3::Y * (r + altitude), glam::DVec3::ZERO, r).unwrap();
+            reach(&quality, &lighting, &space)
+        };
+        for low in [-5.0, 2.0, 9_000.0] {
+            assert_eq!(at(low), quality.max_distance);
+        }
+        for high in [60e3, 400e3, 36e6_f64] {
+            // Tops of 12 km on the far side of the horizon.
+            let r = 6_360_000.0;
+            let rim = (high * (2.0 * r + high)).sqrt() + (12e3 * (2.0 * r + 12e3)).sqrt();
+            assert!(f64::from(at(high) * lighting.fade_start) > rim, "from {high} m");
+        }
+        // Without a jump on the way.
+        let steps: Vec<f32> = (0..1000).map(|k| at(f64::from(k) * 100.0)).collect();
+        assert!(steps.windows(2).all(|w| w[1] >= w[0] && w[1] < 1.02 * w[0] + 1.0));
     }
 }

@@ -118,7 +118,8 @@ pub struct CloudQuality {
     /// Samples whose density is below this are skipped (thesis: 0.01). Default 0.002.
     #[reflect(@0.0..=0.9_f32)]
     pub density_skip: f32,
-    /// Cut-off distance (m): nothing is marched beyond. Default 90 000.
+    /// Cut-off distance (m): nothing is marched beyond. From 10 km up it grows with altitude, so that from space (60 km)
+    /// clouds reach to the planet's rim. Default 90 000.
     #[reflect(@100.0..=2_000_000.0_f32)]
     pub max_distance: f32,
     /// Added to the mip level of all noise: above 0 is smoother and cheaper. Default 0.

@@ -215,3 +215,36 @@ fn a_shift_of_the_origin_does_not_show() {
         assert!(shifted < 2.0 * usual + 1e-3, "{temporal:?}: {shifted} for {usual}");
     }
 }
+
+#[test]
+fn crossing_the_layer_at_2000_m_per_s_has_no_pop() {
+    // Frames that one is compared with on either side: entering thick cloud takes no more of them.
+    const NEAR: usize = 2;
+    let (mut app, view, _) = sky();
+    let climb = Vec3::new(3.0, 33.2, -4.0);
+    let mut worst = 0.0_f32;
+    for temporal in [TemporalMode::SlidingWindow, TemporalMode::Exponential] {
+        app.insert_resource(quality(temporal));
+        // From below the lower shell through cloud and the upper shell to above it.
+        let mut means = Vec::new();
+        for k in 0..110 {
+            let at = Vec3::new(0.0, 700.0, 0.0) + climb * k as f32;
+            let level = Transform::from_translation(at).with_rotation(Quat::from_rotation_x(-0.1));
+            app.world_mut().entity_mut(view.camera).insert(level);
+            run_updates(&mut app, 1);
+            let now = picture(&app, &view);
+            means.push(now.iter().map(|p| p.element_sum()).sum::<f32>() / now.len() as f32);
+        }
+        let changes: Vec<f32> = means.windows(2).map(|w| (w[1] - w[0]).abs()).collect();
+        let typical = changes.iter().sum::<f32>() / changes.len() as f32;
+        for k in NEAR..changes.len() - NEAR {
+            let mut near = [&changes[k - NEAR..k], &changes[k + 1..=k + NEAR]].concat();
+            near.sort_by(f32::total_cmp);
+            // Where next to nothing changes any change is many times that.
+            let jump = changes[k] / near[NEAR].max(typical);
+            worst = worst.max(jump);
+            assert!(jump < 3.0, "{temporal:?}: frame {k} changes by {}, those around by {near:?}", changes[k]);
+        }
+    }
+    println!("largest change {worst:.2} times those around");
+}
