@@ -287,6 +287,8 @@ ensure_virtual_display() { # to open windows where there is no screen, and to pr
     local packages=()
     has Xvfb || packages+=(xvfb)
     has xdotool || packages+=(xdotool)
+    has wmctrl || packages+=(wmctrl)
+    has blackbox || packages+=(blackbox)
     add_x_client
     install_for "the window tests" ${packages[@]+"${packages[@]}"}
 }

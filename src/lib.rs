@@ -51,7 +51,11 @@ use bevy::{
 };
 
 pub use model::ModelShader;
-pub use render::{CloudBuffer, CloudFrame, CloudStatus};
+pub use reference::{
+    keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
+    query::CloudSky,
+};
+pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
     CloudTextures, CloudView,
@@ -60,11 +64,11 @@ pub use settings::{
 /// What most users need.
 pub mod prelude {
     pub use crate::{
-        CloudBuffer, CloudStatus, CloudsPlugin,
+        CloudBuffer, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings,
-            CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution, PhaseFunction,
-            TemporalMode, UpscaleBlock,
+            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
+            CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
+            PhaseFunction, TemporalMode, UpscaleBlock,
         },
     };
 }

@@ -18,7 +18,7 @@ pub struct StartOptions {
     #[arg(long, value_name = "NAME|FILE.ron")]
     pub preset: Option<String>,
     /// What the sky may cost
-    #[arg(long, value_parser = ["low", "medium", "high", "ultra"])]
+    #[arg(long, value_parser = ["low", "medium", "high", "ultra", "reference"])]
     pub quality: Option<String>,
     /// Metres and degrees; y is the altitude, yaw 0 looks along −Z and turns right, fov is vertical (60)
     #[arg(long, value_name = "X,Y,Z,YAW,PITCH[,FOV]", allow_hyphen_values = true)]

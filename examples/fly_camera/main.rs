@@ -9,7 +9,7 @@ mod overlay;
 #[path = "../common/start.rs"]
 mod start;
 
-use anyhow::{Result, ensure};
+use anyhow::Result;
 use bevy::{
     camera_controller::free_camera::{FreeCamera, FreeCameraPlugin, FreeCameraState},
     diagnostic::FrameTimeDiagnosticsPlugin,
@@ -18,7 +18,7 @@ use bevy::{
     render::diagnostic::RenderDiagnosticsPlugin,
 };
 use bevy_cumulus::{
-    inspector::{CloudInspectorPlugin, InspectorWantsInput},
+    inspector::{CloudInspectorPlugin, CloudPresetChosen, InspectorWantsInput},
     prelude::*,
 };
 use bevy_egui::EguiPrimaryContextPass;
@@ -66,14 +66,14 @@ fn main() -> AppExit {
 
 fn fly(options: &Options) -> Result<AppExit> {
     let start = options.start.start(Some("hills"), CloudClock::default())?;
-    // The window library panics instead.
-    let display =
-        ["DISPLAY", "WAYLAND_DISPLAY", "WAYLAND_SOCKET"].into_iter().any(|name| std::env::var_os(name).is_some());
-    ensure!(display || !cfg!(target_os = "linux"), "there is no display: set DISPLAY, or use the headless example");
+    #[cfg(target_os = "linux")]
+    check_display()?;
     let settings = start.settings.clone();
     let title = format!("bevy_cumulus: {}, {}", start.named.unwrap_or(start.scene.name), start.preset);
     let window = Window { title, resolution: options.size.into(), ..default() };
     let speed = if settings.clock.speed == 0.0 { 1.0 } else { settings.clock.speed };
+    // One over the other they could not be read.
+    let panel = !options.bare && options.size.x as f32 >= overlay::BOTH_FROM;
     let flight = Flight { sun: start.sun, presets: keys::Presets::new(), help: !options.bare, speed, start };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }))
@@ -84,14 +84,27 @@ fn fly(options: &Options) -> Result<AppExit> {
         .insert_resource(settings.quality)
         .insert_resource(settings.textures)
         .insert_resource(settings.clock)
-        .insert_resource(bevy_cumulus::inspector::CloudInspector { open: !options.bare })
+        .insert_resource(bevy_cumulus::inspector::CloudInspector { open: panel })
         .insert_resource(flight)
         .add_systems(Startup, setup)
         .add_systems(PreUpdate, share_input.after(InputSystems))
         .add_systems(Update, (keys::sky, keys::clock, keys::screen).run_if(keys::free))
-        .add_systems(Update, move_sun.after(keys::sky))
+        .add_systems(Update, (take_preset_sun, move_sun).chain().after(keys::sky))
         .add_systems(EguiPrimaryContextPass, overlay::show);
     Ok(app.run())
+}
+
+/// Bevy's window library panics where there is no X server to talk to.
+#[cfg(target_os = "linux")]
+fn check_display() -> Result<()> {
+    use anyhow::{bail, ensure};
+
+    let display = std::env::var("DISPLAY").unwrap_or_default();
+    ensure!(!display.is_empty(), "there is no display: set DISPLAY, or use the headless example");
+    match x11rb::rust_connection::RustConnection::connect(None) {
+        Ok(_) => Ok(()),
+        Err(error) => bail!("no X server answers at DISPLAY={display} ({error}); the headless example needs none"),
+    }
 }
 
 fn setup(world: &mut World) {
@@ -119,6 +132,13 @@ fn setup(world: &mut World) {
 fn ev100(flight: &Flight) -> f32 {
     let above = flight.sun.elevation.to_radians().sin().asin().to_degrees();
     common::SunPose { elevation: above, ..flight.sun }.ev100() + flight.start.scene.ev_offset
+}
+
+/// A preset that is chosen in the panel brings its sun, as one chosen by key does.
+fn take_preset_sun(mut chosen: MessageReader<CloudPresetChosen>, mut flight: ResMut<Flight>) {
+    if let Some(elevation) = chosen.read().filter_map(|CloudPresetChosen(preset)| preset.sun_elevation).last() {
+        flight.sun.elevation = elevation;
+    }
 }
 
 fn move_sun(

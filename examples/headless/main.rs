@@ -1,7 +1,8 @@
 //! Makes a picture of a sky without a window: `headless --scene ground_noon --out shot.png`.
 //!
-//! `options` says what is wanted, `shoot` renders it, `timings` measures it, `output` writes it.
+//! `options` says what is wanted (`batch`: of many pictures), `shoot` renders it, `timings` measures it, `output` writes it.
 
+mod batch;
 #[path = "../common/mod.rs"]
 mod common;
 mod options;
@@ -22,7 +23,7 @@ use std::{
 use anyhow::{Context as _, Result, anyhow, bail};
 use bevy_cumulus::prelude::*;
 use clap::Parser as _;
-use options::Options;
+use options::{Options, Plan};
 
 fn main() -> ExitCode {
     match run(&Options::parse()) {
@@ -36,22 +37,43 @@ fn main() -> ExitCode {
 }
 
 fn run(options: &Options) -> Result<()> {
+    if let Some(file) = &options.batch {
+        let plans = batch::plans(file)?;
+        for plan in &plans {
+            check_files(plan)?;
+        }
+        return guarded(|| batch::shoot(&plans));
+    }
     let plan = options.plan()?;
     if options.list {
         list().context("--list")?;
     }
-    let files = plan.files();
-    if files.is_empty() {
+    if options.effective {
+        return print_effective(&plan);
+    }
+    if plan.files().is_empty() {
         if options.list {
             return Ok(());
         }
-        bail!("nothing to do: give --out, --cloud, --timings or --list");
+        bail!("nothing to do: give --out, --cloud, --timings, --list or --effective");
     }
-    for (option, path, extension) in files {
-        output::check(path, extension).with_context(|| option.to_owned())?;
-    }
+    check_files(&plan)?;
     let shot = guarded(|| shoot::shoot(&plan))?;
     output::write(&plan, &shot)
+}
+
+/// Says before the work whether the files can be written after it.
+fn check_files(plan: &Plan) -> Result<()> {
+    for (option, path, extension) in plan.files() {
+        output::check(path, extension).with_context(|| option.to_owned())?;
+    }
+    Ok(())
+}
+
+fn print_effective(plan: &Plan) -> Result<()> {
+    let mut out = std::io::stdout().lock();
+    writeln!(out, "{}", serde_json::to_string_pretty(&plan.effective())?)?;
+    Ok(out.flush()?)
 }
 
 /// Runs `work` and makes an error of a panic in it: the engine panics where there is no GPU or its memory is full.

@@ -22,6 +22,13 @@ pub struct Options {
     /// Print the names of scenes, presets and settable paths, one a line
     #[arg(long)]
     pub list: bool,
+    /// Print every setting that the other options amount to, as JSON, and render nothing
+    #[arg(long)]
+    pub effective: bool,
+    /// Make many pictures in one go: each line of the file holds the options of one, added to those given here. They
+    /// share scene, size and textures; nothing is quoted, `#` begins a comment
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["list", "effective"])]
+    pub batch: Option<PathBuf>,
     #[command(flatten)]
     pub start: StartOptions,
     /// Show one stage of the clouds instead: coverage_map, type_map, dimensional_profile, eroded_density,
@@ -60,6 +67,9 @@ pub struct Options {
     /// Write the cloud buffer: radiance (cd/m²) and transmittance, 32-bit float
     #[arg(long, value_name = "CLOUD.exr")]
     pub cloud: Option<PathBuf>,
+    /// Write the reference's noise: standard errors of luminance (cd/m²) and of transmittance, samples, share lost
+    #[arg(long, value_name = "NOISE.exr")]
+    pub noise: Option<PathBuf>,
     /// Write what each pass and the whole frame took (ms)
     #[arg(long, value_name = "T.json")]
     pub timings: Option<PathBuf>,
@@ -105,6 +115,7 @@ pub struct Plan {
     pub ev100: f32,
     pub out: Option<PathBuf>,
     pub cloud: Option<PathBuf>,
+    pub noise: Option<PathBuf>,
     pub timings: Option<PathBuf>,
     camera: CameraPose,
     travel: [f32; 5],
@@ -122,9 +133,9 @@ impl Options {
         if !strip.is_empty() {
             let pictures = strip.len() as u32;
             ensure!(
-                self.cloud.is_none() && self.timings.is_none(),
-                "--scene {}: a strip of {pictures} pictures has no single cloud buffer and no timings; leave --cloud and \
-                 --timings out",
+                self.cloud.is_none() && self.noise.is_none() && self.timings.is_none(),
+                "--scene {}: a strip of {pictures} pictures has no single cloud buffer, noise and timings; leave --cloud, \
+                 --noise and --timings out",
                 scene.name
             );
             ensure!(
@@ -133,6 +144,10 @@ impl Options {
                 65_536 / pictures
             );
         }
+        ensure!(
+            self.noise.is_none() || settings.quality.method == CloudMethod::PathTrace,
+            "--noise: only --quality reference (or quality.method = PathTrace) knows its noise"
+        );
         Ok(Plan {
             scene,
             named,
@@ -149,6 +164,7 @@ impl Options {
             ev100: self.ev.unwrap_or(sun.ev100() + scene.ev_offset),
             out: self.out.clone(),
             cloud: self.cloud.clone(),
+            noise: self.noise.clone(),
             timings: self.timings.clone(),
             travel: self.travel.unwrap_or_default(),
             sun_move: self.sun_move.unwrap_or_default(),
@@ -184,10 +200,34 @@ impl Plan {
         clock.seconds + f64::from(k) * (self.dt + f64::from(clock.speed) * Self::FRAME_SECONDS)
     }
 
+    /// Whether the cloud buffer is read back: to be written, or to be looked at for what a picture hides.
+    pub fn wants_buffer(&self) -> bool {
+        self.out.is_some() || self.cloud.is_some()
+    }
+
     /// The files asked for: option, path and extension.
     pub fn files(&self) -> Vec<(&'static str, &Path, &'static str)> {
-        let all = [("--out", &self.out, "png"), ("--cloud", &self.cloud, "exr"), ("--timings", &self.timings, "json")];
+        let all = [
+            ("--out", &self.out, "png"),
+            ("--cloud", &self.cloud, "exr"),
+            ("--noise", &self.noise, "exr"),
+            ("--timings", &self.timings, "json"),
+        ];
         all.into_iter().filter_map(|(option, path, kind)| Some((option, path.as_deref()?, kind))).collect()
+    }
+
+    /// What differs from a plan whose engine is to render this one too, if anything does.
+    pub fn differs_in_setup(&self, other: &Self) -> Option<&'static str> {
+        let same = [
+            ("--scene", self.scene.name == other.scene.name),
+            ("--size", self.size == other.size),
+            ("--no-sky", self.sky == other.sky),
+            ("--msaa", self.msaa == other.msaa),
+            ("the exposure", self.ev100 == other.ev100),
+            ("--debug", self.debug == other.debug),
+            ("a setting of textures", self.settings.textures == other.settings.textures),
+        ];
+        same.into_iter().find_map(|(what, same)| (!same).then_some(what))
     }
 
     /// Everything that decides the picture, for the timings file.

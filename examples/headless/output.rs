@@ -57,6 +57,10 @@ pub fn write(plan: &Plan, shot: &Shot) -> Result<()> {
         let cloud = cloud.ok_or_else(|| anyhow!("--cloud: no cloud buffer came back"))?;
         put(path, &encode(&DynamicImage::ImageRgba32F(cloud.clone()), ImageFormat::OpenExr)?)?;
     }
+    if let Some(path) = &plan.noise {
+        let noise = shot.noise.as_ref().ok_or_else(|| anyhow!("--noise: no noise came back"))?;
+        put(path, &encode(&DynamicImage::ImageRgba32F(noise.clone()), ImageFormat::OpenExr)?)?;
+    }
     if let Some(path) = &plan.timings {
         let (passes, frame) = shot.timings.to_json();
         let settings = plan.effective();

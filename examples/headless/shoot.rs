@@ -22,7 +22,7 @@ use bevy::{
     window::ExitCondition,
     winit::WinitPlugin,
 };
-use bevy_cumulus::{CloudBuffer, CloudStatus, prelude::*, textures::CloudTextureStatus};
+use bevy_cumulus::{CloudBuffer, CloudNoise, CloudStatus, prelude::*, textures::CloudTextureStatus};
 use image::{RgbImage, Rgba32FImage};
 
 use crate::{
@@ -37,11 +37,14 @@ const READY_WITHIN: Duration = Duration::from_secs(300);
 const BACK_WITHIN: Duration = Duration::from_secs(120);
 /// Frames rendered after everything is ready and before the first that counts.
 const SETTLING_FRAMES: u32 = 4;
+/// The same for a later picture of a batch, whose sky and textures are there.
+const SETTLED_FRAMES: u32 = 2;
 
 /// What came out.
 pub struct Shot {
     pub picture: Option<RgbImage>,
     pub cloud: Option<Rgba32FImage>,
+    pub noise: Option<Rgba32FImage>,
     pub timings: Timings,
     pub adapter: String,
 }
@@ -51,12 +54,28 @@ pub struct Shot {
 struct Caught {
     picture: Option<Image>,
     cloud: Option<Vec<u8>>,
+    noise: Option<Vec<u8>>,
 }
 
 /// Renders the plan.
 pub fn shoot(plan: &Plan) -> Result<Shot> {
-    let mut studio = Studio::build(plan)?;
+    let mut studio = Studio::build(std::slice::from_ref(plan))?;
     if plan.strip.is_empty() { studio.picture(plan) } else { studio.strip(plan) }
+}
+
+/// Renders plans that share scene, size and textures, one after another, and hands each picture on.
+pub fn shoot_many(plans: &[Plan], mut done: impl FnMut(&Plan, &Shot) -> Result<()>) -> Result<()> {
+    let Some(first) = plans.first() else { return Ok(()) };
+    let mut studio = Studio::build(plans)?;
+    studio.make_ready(first, SETTLING_FRAMES)?;
+    for plan in plans {
+        set(studio.app.world_mut(), &plan.settings);
+        studio.pose(plan, 0);
+        studio.make_ready(plan, SETTLED_FRAMES)?;
+        let timings = studio.count_frames(plan)?;
+        done(plan, &studio.shot(plan, timings)?)?;
+    }
+    Ok(())
 }
 
 struct Studio {
@@ -68,6 +87,7 @@ struct Studio {
     target: Handle<Image>,
     /// Absent where only timings are wanted, so that it costs them nothing.
     buffer: Option<Handle<Image>>,
+    noise: Option<Handle<Image>>,
 }
 
 fn engine(plan: &Plan) -> App {
@@ -100,7 +120,9 @@ fn engine(plan: &Plan) -> App {
 }
 
 impl Studio {
-    fn build(plan: &Plan) -> Result<Self> {
+    fn build(plans: &[Plan]) -> Result<Self> {
+        let plan = plans.first().ok_or_else(|| anyhow!("there is nothing to render"))?;
+        let wants = |what: fn(&Plan) -> bool| plans.iter().any(what);
         let mut app = engine(plan);
         let world = app.world_mut();
         set(world, plan.strip.first().unwrap_or(&plan.settings));
@@ -114,8 +136,8 @@ impl Studio {
 
         let mut images = world.resource_mut::<Assets<Image>>();
         let target = images.add(Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None));
-        let wanted = plan.out.is_some() || plan.cloud.is_some();
-        let buffer = wanted.then(|| images.add(CloudBuffer::image(width, height)));
+        let buffer = wants(Plan::wants_buffer).then(|| images.add(CloudBuffer::image(width, height)));
+        let noise = wants(|plan| plan.noise.is_some()).then(|| images.add(CloudNoise::image(width, height)));
         let camera = world
             .spawn((
                 common::camera(plan.ev100),
@@ -130,8 +152,11 @@ impl Studio {
         if let Some(buffer) = &buffer {
             world.entity_mut(camera).insert(CloudBuffer(buffer.clone()));
         }
+        if let Some(noise) = &noise {
+            world.entity_mut(camera).insert(CloudNoise(noise.clone()));
+        }
         let second = plan.scene.split.then(|| Self::split(world, camera, plan));
-        let mut studio = Self { app, camera, second, sun, target, buffer };
+        let mut studio = Self { app, camera, second, sun, target, buffer, noise };
         studio.pose(plan, 0);
         Ok(studio)
     }
@@ -182,7 +207,7 @@ impl Studio {
     }
 
     /// Renders until textures are baked and pipelines are there, then a few frames more.
-    fn make_ready(&mut self, plan: &Plan) -> Result<()> {
+    fn make_ready(&mut self, plan: &Plan, settling: u32) -> Result<()> {
         let started = Instant::now();
         let stage = Stage::begin("baking textures", 100);
         // Thrown away: it has the screenshot's own pipeline made before frames are timed.
@@ -190,7 +215,7 @@ impl Studio {
             self.app.world_mut().spawn(Screenshot::image(self.target.clone()));
         }
         let mut settled = 0;
-        while settled < SETTLING_FRAMES {
+        while settled < settling {
             ensure!(
                 started.elapsed() < READY_WITHIN,
                 "textures and pipelines were not ready within {} s",
@@ -235,7 +260,7 @@ impl Studio {
             view.reset += 1;
         }
         let stage = Stage::begin("rendering frames", plan.frames.into());
-        let mut readback = None;
+        let mut readback = Vec::new();
         let (mut update, mut waiting_since) = (0, Instant::now());
         loop {
             let counted = update < plan.frames;
@@ -251,7 +276,7 @@ impl Studio {
             if counted {
                 timings.add_frame(began.elapsed().as_secs_f64() * 1e3);
             }
-            if let Some(entity) = readback.take() {
+            for entity in std::mem::take(&mut readback) {
                 self.app.world_mut().entity_mut(entity).remove::<Readback>();
             }
             let of_counted = (LAG..plan.frames + LAG).contains(&update);
@@ -270,7 +295,7 @@ impl Studio {
     }
 
     /// Asks for what the next update renders.
-    fn request(&mut self, plan: &Plan) -> Option<Entity> {
+    fn request(&mut self, plan: &Plan) -> Vec<Entity> {
         let world = self.app.world_mut();
         if plan.out.is_some() {
             world.spawn(Screenshot::image(self.target.clone())).observe(
@@ -279,21 +304,30 @@ impl Studio {
                 },
             );
         }
-        let buffer = self.buffer.clone()?;
-        let mut entity = world.spawn(Readback::texture(buffer));
-        entity.observe(|read: On<ReadbackComplete>, mut caught: ResMut<Caught>| {
-            caught.cloud.get_or_insert_with(|| read.data.clone());
+        type Slot = fn(&mut Caught) -> &mut Option<Vec<u8>>;
+        let slots: [(_, _, Slot); 2] = [
+            (plan.wants_buffer(), &self.buffer, |caught| &mut caught.cloud),
+            (plan.noise.is_some(), &self.noise, |caught| &mut caught.noise),
+        ];
+        let asked = slots.into_iter().filter_map(|(wanted, image, slot)| {
+            let mut entity = world.spawn(Readback::texture(image.clone().filter(|_| wanted)?));
+            entity.observe(move |read: On<ReadbackComplete>, mut caught: ResMut<Caught>| {
+                slot(&mut caught).get_or_insert_with(|| read.data.clone());
+            });
+            Some(entity.id())
         });
-        Some(entity.id())
+        asked.collect()
     }
 
     fn is_back(&self, plan: &Plan) -> bool {
         let caught = self.app.world().resource::<Caught>();
-        (plan.out.is_none() || caught.picture.is_some()) && (self.buffer.is_none() || caught.cloud.is_some())
+        (plan.out.is_none() || caught.picture.is_some())
+            && (!plan.wants_buffer() || caught.cloud.is_some())
+            && (plan.noise.is_none() || caught.noise.is_some())
     }
 
     fn picture(&mut self, plan: &Plan) -> Result<Shot> {
-        self.make_ready(plan)?;
+        self.make_ready(plan, SETTLING_FRAMES)?;
         let timings = self.count_frames(plan)?;
         self.shot(plan, timings)
     }
@@ -319,10 +353,11 @@ impl Studio {
         let caught = std::mem::take(&mut *world.resource_mut::<Caught>());
         let picture = caught.picture.map(Image::try_into_dynamic).transpose();
         let picture = picture.map_err(|error| anyhow!("the picture: {error}"))?;
-        let cloud = caught.cloud.map(|bytes| cloud_image(plan.size, &bytes)).transpose()?;
+        let [cloud, noise] =
+            [caught.cloud, caught.noise].map(|bytes| bytes.map(|bytes| cloud_image(plan.size, &bytes)).transpose());
         let info = world.resource::<RenderAdapterInfo>();
         let adapter = format!("{} ({:?})", info.name, info.backend);
-        Ok(Shot { picture: picture.map(|picture| picture.to_rgb8()), cloud, timings, adapter })
+        Ok(Shot { picture: picture.map(|picture| picture.to_rgb8()), cloud: cloud?, noise: noise?, timings, adapter })
     }
 }
 

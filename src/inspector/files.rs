@@ -27,25 +27,25 @@ pub(super) struct PresetState {
     path: String,
     /// What came of the last load or save.
     said: Option<Result<String, String>>,
-    /// The sun's elevation that the last chosen preset was made for; saved with the next one.
-    sun_elevation: Option<f32>,
 }
 
 impl Default for PresetState {
     fn default() -> Self {
         let built_in = CloudPreset::names().filter_map(|name| Some((name, CloudPreset::named(name)?)));
-        Self { built_in: built_in.collect(), path: String::new(), said: None, sun_elevation: None }
+        Self { built_in: built_in.collect(), path: String::new(), said: None }
     }
 }
 
 impl PresetState {
-    /// Shows the presets. Returns one that was chosen or loaded; it is already validated.
+    /// Shows the presets; `current` is what would be saved. Returns one that was chosen or loaded; it is already
+    /// validated.
     pub fn ui(&mut self, ui: &mut Ui, current: &CloudPreset) -> Option<CloudPreset> {
         let mut chosen = None;
         ui.horizontal_wrapped(|ui| {
             for (name, preset) in &self.built_in {
                 let here = is_same(preset, current);
-                if ui.selectable_label(here, *name).clicked() && !here {
+                // One in use may still be chosen, for its sun.
+                if ui.selectable_label(here, *name).on_hover_text(sun_advice(preset)).clicked() {
                     self.said = None;
                     chosen = Some(preset.clone());
                 }
@@ -54,10 +54,12 @@ impl PresetState {
         ui.horizontal(|ui| {
             let hint = format!("sky{EXTENSION}");
             ui.add(TextEdit::singleline(&mut self.path).hint_text(hint).desired_width(170.0));
-            if ui.button("Load").on_hover_text("Reads this file").clicked() {
+            let tip = "Reads this file. The app is told for which sun it was saved, and may move its light there";
+            if ui.button("Load").on_hover_text(tip).clicked() {
                 chosen = self.load();
             }
-            let tip = "Writes model, lighting and textures to this file; what is in it is replaced";
+            let tip =
+                "Writes model, lighting, textures and the sun's elevation to this file; what is in it is replaced";
             if ui.button("Save").on_hover_text(tip).clicked() {
                 self.save(current);
             }
@@ -66,9 +68,6 @@ impl PresetState {
             Some(Ok(text)) => _ = ui.label(text),
             Some(Err(text)) => _ = ui.colored_label(RED, text),
             None => {}
-        }
-        if let Some(preset) = &chosen {
-            self.sun_elevation = preset.sun_elevation;
         }
         chosen
     }
@@ -87,9 +86,8 @@ impl PresetState {
     }
 
     fn save(&mut self, current: &CloudPreset) {
-        let preset = CloudPreset { sun_elevation: self.sun_elevation, ..current.clone() };
         let path = self.path.trim();
-        self.said = Some(match write(&preset, path) {
+        self.said = Some(match write(current, path) {
             Ok(()) => Ok(format!("saved {path}")),
             Err(reason) => Err(format!("{path}: {reason}")),
         });
@@ -116,9 +114,35 @@ fn write(preset: &CloudPreset, path: &str) -> Result<(), String> {
     std::fs::write(path, text).map_err(|error| error.to_string())
 }
 
-/// The preset that the settings amount to.
-pub(super) fn current(model: &CloudModel, lighting: &CloudLighting, textures: &CloudTextures) -> CloudPreset {
-    CloudPreset { model: model.clone(), lighting: lighting.clone(), textures: textures.clone(), sun_elevation: None }
+/// A preset's tooltip.
+fn sun_advice(preset: &CloudPreset) -> String {
+    let made_for = match preset.sun_elevation {
+        Some(elevation) => format!("Made for a sun {elevation:.0}° above the horizon"),
+        None => "Made for any sun".to_owned(),
+    };
+    format!("{made_for}. Sets model, lighting and textures; the light is the app's, which is told and may move it.")
+}
+
+/// The preset that the settings and the scene's brightest light amount to.
+pub(super) fn current<'a>(
+    model: &CloudModel,
+    lighting: &CloudLighting,
+    textures: &CloudTextures,
+    lights: impl Iterator<Item = (&'a DirectionalLight, &'a GlobalTransform)>,
+) -> CloudPreset {
+    let sun = lights.max_by(|(a, _), (b, _)| a.illuminance.total_cmp(&b.illuminance));
+    CloudPreset {
+        model: model.clone(),
+        lighting: lighting.clone(),
+        textures: textures.clone(),
+        sun_elevation: sun.map(|(_, place)| elevation(place)),
+    }
+}
+
+/// Of a sun with this transform (degrees). Rounded, so that one that was saved, loaded and saved again stays the same.
+fn elevation(sun: &GlobalTransform) -> f32 {
+    let towards = sun.back();
+    (towards.y.atan2(towards.xz().length()).to_degrees() * 100.0).round() / 100.0
 }
 
 /// What the texture slots' part of the panel remembers, by the slot's name.

@@ -57,15 +57,43 @@ fn what_cannot_be_loaded_or_saved_is_explained() {
 }
 
 #[test]
-fn a_built_in_preset_is_chosen_by_a_click() {
-    let (mut screen, mut state, current) = (Screen::new(), PresetState::default(), CloudPreset::default());
-    let texts = screen.frame(vec![], |ui| assert_eq!(state.ui(ui, &current), None));
-    let mut chosen = None;
-    for events in click(find(&texts, "Overcast")) {
-        screen.frame(events, |ui| chosen = chosen.take().or(state.ui(ui, &current)));
+fn a_built_in_preset_is_chosen_by_a_click_even_where_it_is_in_use() {
+    let overcast = CloudPreset::named("overcast").expect("a preset");
+    for current in [CloudPreset::default(), CloudPreset { sun_elevation: Some(-3.0), ..overcast.clone() }] {
+        let (mut screen, mut state) = (Screen::new(), PresetState::default());
+        let texts = screen.frame(vec![], |ui| assert_eq!(state.ui(ui, &current), None));
+        let mut chosen = None;
+        for events in click(find(&texts, "Overcast")) {
+            screen.frame(events, |ui| chosen = chosen.take().or(state.ui(ui, &current)));
+        }
+        assert_eq!(chosen.as_ref(), Some(&overcast));
     }
-    assert_eq!(chosen, CloudPreset::named("overcast"));
-    assert!(chosen.is_some());
+}
+
+#[test]
+fn tooltips_say_for_which_sun_a_preset_is() {
+    let preset = |sun_elevation| CloudPreset { sun_elevation, ..CloudPreset::default() };
+    assert!(sun_advice(&preset(Some(3.4))).starts_with("Made for a sun 3° above the horizon. "));
+    assert!(sun_advice(&preset(None)).starts_with("Made for any sun. "));
+}
+
+#[test]
+fn the_brightest_light_is_saved_as_the_sun() {
+    let light = |illuminance, elevation: f32| {
+        let place = Transform::from_rotation(Quat::from_euler(EulerRot::YXZ, 0.7, -elevation.to_radians(), 0.0));
+        (DirectionalLight { illuminance, ..default() }, GlobalTransform::from(place))
+    };
+    let (moon, sun) = (light(0.3, 71.0), light(90_000.0, 12.34));
+    let saved = |lights: &[(DirectionalLight, GlobalTransform)]| {
+        let (model, lighting, textures) = default();
+        current(&model, &lighting, &textures, lights.iter().map(|(light, place)| (light, place))).sun_elevation
+    };
+    assert_eq!(saved(&[]), None);
+    assert_eq!(saved(&[moon.clone(), sun.clone(), moon]), Some(12.34));
+    // As it comes back from a file.
+    assert_eq!(saved(&[light(1.0, saved(&[sun]).expect("a sun"))]), Some(12.34));
+    assert_eq!(saved(&[light(1.0, -4.0)]), Some(-4.0));
+    assert_eq!(saved(&[light(1.0, 90.0)]), Some(90.0));
 }
 
 #[test]

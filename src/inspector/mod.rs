@@ -9,7 +9,7 @@
 //!
 //! | Part | What it shows |
 //! |---|---|
-//! | Preset | the built-in skies; loading and saving `*.clouds.ron` |
+//! | Preset | the built-in skies; loading and saving `*.clouds.ron`; [`CloudPresetChosen`] tells the app |
 //! | Modelling | [`CloudModel`](crate::CloudModel), [`CloudTextures`](crate::CloudTextures), the texture slots |
 //! | (a box) | [`CloudDebugView`](crate::CloudDebugView) of all cameras |
 //! | Rendering | [`CloudLighting`](crate::CloudLighting) |
@@ -26,6 +26,8 @@ mod panel;
 use bevy::{diagnostic::DiagnosticsStore, prelude::*};
 use bevy_egui::{EguiPlugin, EguiPostUpdateSet, EguiPrimaryContextPass, input::EguiWantsInput};
 
+use crate::settings::CloudPreset;
+
 /// Shows the panel in the window of the first camera.
 ///
 /// Add it after `CloudsPlugin`. It adds bevy_egui's `EguiPlugin` if the app has none yet; an app that adds its own
@@ -41,6 +43,7 @@ impl Plugin for CloudInspectorPlugin {
         app.init_resource::<CloudInspector>()
             .init_resource::<InspectorWantsInput>()
             .add_message::<crate::textures::CloudTextureError>()
+            .add_message::<CloudPresetChosen>()
             .add_systems(EguiPrimaryContextPass, panel::show)
             .add_systems(PostUpdate, publish_wants.after(EguiPostUpdateSet::ProcessOutput));
     }
@@ -59,6 +62,11 @@ impl Default for CloudInspector {
         Self { open: true }
     }
 }
+
+/// The user chose this preset in the panel, or loaded it from a file. Its settings are in place already; the plugin
+/// moves no light, so an app that wants the preset's sun moves its own to [`CloudPreset::sun_elevation`].
+#[derive(Message, Clone, PartialEq, Debug)]
+pub struct CloudPresetChosen(pub CloudPreset);
 
 /// Which input egui takes for itself, as of the last frame: leave it to the panel then. Covers all of the app's egui,
 /// not only this panel. Writing to it does nothing.

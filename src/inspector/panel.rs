@@ -12,7 +12,7 @@ use bevy_egui::{
 };
 
 use super::{
-    CloudInspector,
+    CloudInspector, CloudPresetChosen,
     fields::struct_ui,
     files::{PresetState, RED, SlotsState, current},
 };
@@ -29,6 +29,8 @@ use crate::{
 #[derive(SystemParam)]
 pub(super) struct Shown<'w, 's> {
     views: Query<'w, 's, &'static mut CloudView>,
+    lights: Query<'w, 's, (&'static DirectionalLight, &'static GlobalTransform)>,
+    chosen: MessageWriter<'w, CloudPresetChosen>,
     model: Option<ResMut<'w, CloudModel>>,
     lighting: Option<ResMut<'w, CloudLighting>>,
     quality: Option<ResMut<'w, CloudQuality>>,
@@ -112,10 +114,11 @@ fn presets_ui(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {
         ui.label("there is no CloudsPlugin");
         return;
     };
-    if let Some(preset) = state.presets.ui(ui, &current(model, lighting, textures)) {
-        model.set_if_neq(preset.model);
-        lighting.set_if_neq(preset.lighting);
-        textures.set_if_neq(preset.textures);
+    if let Some(preset) = state.presets.ui(ui, &current(model, lighting, textures, shown.lights.iter())) {
+        model.set_if_neq(preset.model.clone());
+        lighting.set_if_neq(preset.lighting.clone());
+        textures.set_if_neq(preset.textures.clone());
+        shown.chosen.write(CloudPresetChosen(preset));
     }
 }
 

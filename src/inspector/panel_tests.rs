@@ -65,8 +65,8 @@ fn a_bad_edit_is_explained_and_kept_back() {
 #[test]
 fn a_held_edit_is_returned_when_let_go() {
     let (mut screen, mut section, now) = (Screen::new(), Section::default(), CloudQuality::default());
-    // The first field is a choice; the second a slider.
-    for events in [vec![], press(Key::Tab), vec![], press(Key::Tab), vec![]] {
+    // The first two fields are choices; the third a slider.
+    for events in [vec![], press(Key::Tab), vec![], press(Key::Tab), vec![], press(Key::Tab), vec![]] {
         assert_eq!(edit(&mut screen, &mut section, &now, events, true).0, None);
     }
     assert_eq!(edit(&mut screen, &mut section, &now, press(Key::ArrowRight), true).0, None);

@@ -37,38 +37,38 @@ impl TexelSizes {
     }
 }
 
-/// `Model` of `model.wesl`, field for field.
+/// `Model` of `model.wesl`, field for field. The CPU twin (`reference/field.rs`) reads the same numbers.
 #[derive(ShaderType, Clone, Copy, Debug, Default)]
 pub(crate) struct ModelUniform {
-    radius: f32,
-    bottom: f32,
-    top: f32,
-    coverage: f32,
-    cloud_type: f32,
-    type_variation: f32,
-    map_variation: f32,
-    density: f32,
-    extinction: f32,
-    erosion: u32,
-    noise_strength: f32,
-    detail_strength: f32,
-    wisp_height: f32,
-    billow_rate: f32,
-    detail_rate: f32,
-    wisp_rate: f32,
-    map_rate: f32,
-    group_rate: f32,
-    type_rate: f32,
-    skew: f32,
-    lean: Vec4,
-    map_offset: Vec4,
-    type_offset: Vec4,
-    billow_offset: Vec4,
-    detail_offset: Vec4,
-    wisp_offset: Vec4,
-    texels: Vec4,
-    map_texels: Vec4,
-    albedo: Vec4,
+    pub radius: f32,
+    pub bottom: f32,
+    pub top: f32,
+    pub coverage: f32,
+    pub cloud_type: f32,
+    pub type_variation: f32,
+    pub map_variation: f32,
+    pub density: f32,
+    pub extinction: f32,
+    pub erosion: u32,
+    pub noise_strength: f32,
+    pub detail_strength: f32,
+    pub wisp_height: f32,
+    pub billow_rate: f32,
+    pub detail_rate: f32,
+    pub wisp_rate: f32,
+    pub map_rate: f32,
+    pub group_rate: f32,
+    pub type_rate: f32,
+    pub skew: f32,
+    pub lean: Vec4,
+    pub map_offset: Vec4,
+    pub type_offset: Vec4,
+    pub billow_offset: Vec4,
+    pub detail_offset: Vec4,
+    pub wisp_offset: Vec4,
+    pub texels: Vec4,
+    pub map_texels: Vec4,
+    pub albedo: Vec4,
 }
 
 impl ModelUniform {
@@ -134,6 +134,13 @@ impl ModelUniform {
             ),
             albedo: model.albedo.extend(1.0),
         }
+    }
+}
+
+impl ModelUniform {
+    /// The erosion that `erosion` stands for.
+    pub fn erosion(&self) -> Erosion {
+        if self.erosion == 0 { Erosion::Subtract } else { Erosion::Remap }
     }
 }
 

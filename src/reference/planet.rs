@@ -8,6 +8,22 @@ use bevy::math::{DVec2, DVec3};
 /// Radius of the planet where the scene's `Atmosphere` gives none (m).
 pub const PLANET_RADIUS: f64 = 6_360_000.0;
 
+/// A planet of the scene.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Planet {
+    /// Its centre (world space, m).
+    pub centre: DVec3,
+    /// Its radius (m).
+    pub radius: f64,
+}
+
+impl Default for Planet {
+    /// Where the scene has no `Atmosphere`: [`PLANET_RADIUS`], with the world's origin on its surface.
+    fn default() -> Self {
+        Self { centre: DVec3::new(0.0, -PLANET_RADIUS, 0.0), radius: PLANET_RADIUS }
+    }
+}
+
 /// A stretch of a ray: distances from the camera (m) where it begins and ends.
 pub type Interval = [f64; 2];
 
@@ -40,24 +56,28 @@ pub fn shell_roots(h0: f64, mu: f64, shell: f64, radius: f64) -> Option<Interval
 /// The planet's surface (altitude 0) ends the ray. A camera below it (in a valley under sea level) sees out through
 /// it, but sees nothing below the horizontal. `bottom` and `top` are altitudes; the rest is as in [`shell_roots`].
 pub fn shell_intervals(h0: f64, mu: f64, bottom: f64, top: f64, radius: f64, t_max: f64) -> Vec<Interval> {
-    let Some(outer) = shell_roots(h0, mu, top, radius) else {
-        return Vec::new();
-    };
     if h0 < 0.0 && mu < 0.0 {
         return Vec::new();
     }
-    let mut end = t_max;
-    if h0 >= 0.0
-        && let Some([first, last]) = shell_roots(h0, mu, 0.0, radius)
-        && last > 0.0
-    {
-        end = end.min(first.max(0.0));
-    }
+    let ground = if h0 >= 0.0 { ground_distance(h0, mu, radius) } else { None };
+    layer_intervals(h0, mu, [bottom, top], radius, t_max.min(ground.unwrap_or(f64::INFINITY)))
+}
+
+/// Distance to the planet's surface (m), seen from above it (`h0` ≥ 0); `None` where the ray misses it.
+pub fn ground_distance(h0: f64, mu: f64, radius: f64) -> Option<f64> {
+    shell_roots(h0, mu, 0.0, radius).filter(|[_, last]| *last > 0.0).map(|[first, _]| first.max(0.0))
+}
+
+/// The parts of a ray between the shells `bottom` and `top` within 0..=`t_max`, as if there were no surface.
+pub fn layer_intervals(h0: f64, mu: f64, [bottom, top]: [f64; 2], radius: f64, t_max: f64) -> Vec<Interval> {
+    let Some(outer) = shell_roots(h0, mu, top, radius) else {
+        return Vec::new();
+    };
     let parts = match shell_roots(h0, mu, bottom, radius) {
         None => vec![outer],
         Some(inner) => vec![[outer[0], inner[0]], [inner[1], outer[1]]],
     };
-    parts.into_iter().map(|[a, b]| [a.max(0.0), b.min(end)]).filter(|[a, b]| b > a).collect()
+    parts.into_iter().map(|[a, b]| [a.max(0.0), b.min(t_max)]).filter(|[a, b]| b > a).collect()
 }
 
 /// Horizontal map coordinates of `p` relative to the point below the camera (m): arc length along the surface, in the

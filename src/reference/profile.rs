@@ -66,14 +66,16 @@ pub fn dimensional_profile(coverage: f64, vertical: f64) -> f64 {
 /// What noise `n` leaves of the dimensional profile `d`, before the global density ρc is multiplied in.
 ///
 /// [`Erosion::Subtract`] is `saturate(n − (1 − d))` (Ford 3.2); [`Erosion::Remap`] is `remap(d, 1 − n, 1, 0, 1)`, kept within
-/// 0..=1 (Schneider). Both are 0 where `d` is 0, and at most `d`.
+/// 0..=1 (Schneider), that is the former over `n`, here as in the shader over 1e-4 at least. Both are 0 where `d` is 0,
+/// and at most `d`.
 pub fn erode(d: f64, n: f64, erosion: Erosion) -> f64 {
     if d <= 0.0 {
         return 0.0;
     }
+    let subtracted = d - (1.0 - n);
     match erosion {
-        Erosion::Subtract => (n - (1.0 - d)).clamp(0.0, 1.0),
-        Erosion::Remap => remap_saturated(d, [1.0 - n, 1.0], [0.0, 1.0]),
+        Erosion::Subtract => subtracted.clamp(0.0, 1.0),
+        Erosion::Remap => (subtracted / n.max(1e-4)).clamp(0.0, 1.0),
     }
 }
 

@@ -35,10 +35,15 @@ pub(crate) struct CloudBindGroups {
     pub empty: BindGroup,
     pub model: BindGroup,
     pub sky: (CachedComputePipelineId, BindGroup),
-    pub march: (CachedComputePipelineId, BindGroup),
-    pub accumulate: (CachedComputePipelineId, BindGroup),
+    pub light: Light,
     pub composite: (CachedRenderPipelineId, BindGroup),
     pub publish: Option<(CachedComputePipelineId, BindGroup)>,
+}
+
+/// How the cloud's light is found.
+pub(crate) enum Light {
+    March { march: (CachedComputePipelineId, BindGroup), accumulate: (CachedComputePipelineId, BindGroup) },
+    PathTrace { trace: (CachedComputePipelineId, BindGroup), noise: Option<(CachedComputePipelineId, BindGroup)> },
 }
 
 /// A view's ambient light, written by the sky stage.
@@ -175,6 +180,7 @@ fn view_bind_groups(
         multisampled,
         target: item.view.target_format,
         debug: item.cloud.debug.shader(),
+        path_traced: item.cloud.is_path_traced(),
     };
     let ids = pipelines.get(cache, model, variant);
     // All stages or none: a composite without a march would blend what nobody has written.
@@ -190,35 +196,8 @@ fn view_bind_groups(
     let group = |label: &'static str, descriptor: &BindGroupLayoutDescriptor, entries: &[BindGroupEntry]| {
         device.create_bind_group(label, &layout(descriptor), entries)
     };
-    let march = group(
-        "cloud_march",
-        &pipelines.march[ms],
-        &BindGroupEntries::sequential((
-            frame.clone(),
-            sky_light.as_entire_binding(),
-            textures.blue_noise.as_ref()?,
-            depth,
-            history.newest(),
-            history.marched_distances(),
-            world_from_local.clone(),
-            history.marched_before(),
-            history.marched_now(),
-            held.clone(),
-        )),
-    );
-    let resolved = BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth));
-    let publish = item.cloud.buffer.and_then(|id| images.get(id)).map(|image| {
-        let entries = BindGroupEntries::sequential((
-            frame.clone(),
-            history.sum_after(),
-            &history.distances,
-            depth,
-            &image.texture_view,
-        ));
-        (ids.publish, group("cloud_publish", &pipelines.publish[ms], &entries))
-    });
     // One of two ways to make a picture of the frames.
-    let accumulate = match history.marched_after() {
+    let picture_group = || match history.marched_after() {
         Some(marched_after) => {
             let entries = BindGroupEntries::sequential((
                 frame.clone(),
@@ -226,7 +205,7 @@ fn view_bind_groups(
                 history.sum_before(),
                 depth,
                 &history.marched_view,
-                held,
+                held.clone(),
                 history.marched_before(),
                 history.sum_after(),
                 marched_after,
@@ -241,11 +220,68 @@ fn view_bind_groups(
                 history.sum_before(),
                 history.sum_after(),
                 &history.marched_view,
-                held,
+                held.clone(),
             ));
             (ids.accumulate, group("cloud_accumulate", &pipelines.accumulate, &entries))
         }
     };
+    let light = match ids.traced {
+        None => Light::March {
+            march: (
+                ids.drawable_march(cache),
+                group(
+                    "cloud_march",
+                    &pipelines.march[ms],
+                    &BindGroupEntries::sequential((
+                        frame.clone(),
+                        sky_light.as_entire_binding(),
+                        textures.blue_noise.as_ref()?,
+                        depth,
+                        history.newest(),
+                        history.marched_distances(),
+                        world_from_local.clone(),
+                        history.marched_before(),
+                        history.marched_now(),
+                        held.clone(),
+                    )),
+                ),
+            ),
+            accumulate: picture_group(),
+        },
+        Some([trace, noise]) => {
+            let [before, after] = history.moments()?;
+            let entries = BindGroupEntries::sequential((
+                frame.clone(),
+                history.sum_before(),
+                before,
+                depth,
+                history.sum_after(),
+                &history.distances,
+                world_from_local.clone(),
+                after,
+            ));
+            let image = item.cloud.noise.and_then(|id| images.get(id));
+            Light::PathTrace {
+                trace: (trace, group("cloud_path_trace", &pipelines.path_tracer.trace[ms], &entries)),
+                noise: image.map(|image| {
+                    let entries =
+                        BindGroupEntries::sequential((frame.clone(), history.sum_after(), after, &image.texture_view));
+                    (noise, group("cloud_noise", &pipelines.path_tracer.noise, &entries))
+                }),
+            }
+        }
+    };
+    let resolved = BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth));
+    let publish = item.cloud.buffer.and_then(|id| images.get(id)).map(|image| {
+        let entries = BindGroupEntries::sequential((
+            frame.clone(),
+            history.sum_after(),
+            &history.distances,
+            depth,
+            &image.texture_view,
+        ));
+        (ids.publish, group("cloud_publish", &pipelines.publish[ms], &entries))
+    });
     let groups = CloudBindGroups {
         model: model.bind_group(device, cache, &item.uniforms.model, textures)?,
         sky: (
@@ -256,8 +292,7 @@ fn view_bind_groups(
                 &BindGroupEntries::sequential((frame, sky_light.as_entire_binding(), world_from_local)),
             ),
         ),
-        march: (ids.drawable_march(cache), march),
-        accumulate,
+        light,
         composite: (ids.composite, group("cloud_composite", &pipelines.composite[ms], &resolved)),
         publish,
         air,

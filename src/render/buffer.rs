@@ -45,6 +45,22 @@ impl CloudFrame {
     }
 }
 
+/// On a camera whose clouds are path-traced: every frame the noise of the picture so far is written into this image.
+///
+/// R is the standard error of the radiance's luminance (cd/m²), G that of transmittance, both from the samples' own
+/// variance; B is the number of samples; A is the share of the paths' weight that the safety stop (20 000 events) cut off.
+/// One texel a pixel. Make the image with [`CloudNoise::image`].
+#[derive(Component, Reflect, Clone, Debug)]
+#[reflect(Component, Clone)]
+pub struct CloudNoise(pub Handle<Image>);
+
+impl CloudNoise {
+    /// An image of this size (px) that the noise can be written to: `Rgba32Float`.
+    pub fn image(width: u32, height: u32) -> Image {
+        CloudBuffer::image(width, height)
+    }
+}
+
 fn blank(width: u32, height: u32, format: TextureFormat, write: TextureUsages) -> Image {
     let size = Extent3d { width: width.max(1), height: height.max(1), depth_or_array_layers: 1 };
     let texel = [0; 16];
@@ -93,6 +109,7 @@ pub(crate) fn refuse_unfit_images(
     for mut view in &mut views {
         let view = &mut *view;
         check(&mut view.buffer, "CloudBuffer", TextureFormat::Rgba32Float, TextureUsages::STORAGE_BINDING);
+        check(&mut view.noise, "CloudNoise", TextureFormat::Rgba32Float, TextureUsages::STORAGE_BINDING);
         check(&mut view.frame, "CloudFrame", TextureFormat::Rgba16Float, TextureUsages::COPY_DST);
     }
 }

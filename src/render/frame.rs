@@ -63,13 +63,13 @@ pub(crate) struct FrameUniform {
 
 /// Marched size of a viewport.
 pub(crate) fn marched_size(viewport: UVec4, quality: &CloudQuality) -> UVec2 {
-    let divisor = quality.resolution.divisor();
+    let divisor = quality.divisor();
     UVec2::new(viewport.z.div_ceil(divisor), viewport.w.div_ceil(divisor))
 }
 
 /// Angle a marched texel spans (rad): 2 tan(fov/2) over the marched height.
 pub(crate) fn texel_angle(clip_from_view: Mat4, viewport: UVec4, quality: &CloudQuality) -> f32 {
-    2.0 * quality.resolution.divisor() as f32 / (clip_from_view.y_axis.y.abs() * viewport.w as f32)
+    2.0 * quality.divisor() as f32 / (clip_from_view.y_axis.y.abs() * viewport.w as f32)
 }
 
 impl FrameUniform {
@@ -81,6 +81,7 @@ impl FrameUniform {
         // Settings are validated before they get here, so the fallback is never seen.
         let phase = Phase::from_settings(lighting).unwrap_or(Phase::Isotropic);
         let (kind, phase_params) = phase.shader_parameters();
+        let held = if quality.is_path_traced() { window.index + 1 } else { window.held_after() };
         Self {
             view_from_clip: input.clip_from_view.inverse(),
             local_from_view: Mat4::from_quat(local_from_world * input.world_from_view),
@@ -115,10 +116,10 @@ impl FrameUniform {
             history: Vec4::new(
                 window.exposure,
                 input.exposure / window.exposure,
-                window.held_after() as f32,
+                held as f32,
                 lighting.aerial_perspective,
             ),
-            size: UVec4::new(size.x, size.y, quality.resolution.divisor(), window.index & 255),
+            size: UVec4::new(size.x, size.y, quality.divisor(), window.index & 255),
             viewport: *viewport,
             counts: UVec4::new(quality.max_steps, quality.light_steps, lighting.octaves, kind),
             flags: UVec4::new(
@@ -131,7 +132,7 @@ impl FrameUniform {
                 quality.offsets.into(),
             ),
             layers: UVec4::new(window.layer(), window.leaving_layer(), window.layers(), window.held_before),
-            debug: UVec4::new(input.debug.shader_mode(), 0, 0, 0),
+            debug: UVec4::new(input.debug.shader_mode(), window.index, quality.seed, 0),
         }
     }
 }

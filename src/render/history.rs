@@ -82,6 +82,8 @@ pub(crate) struct CloudHistory {
     marched_layers: Vec<TextureView>,
     sums: [TextureView; 2],
     carried: Option<Carried>,
+    /// Of the path tracer's samples.
+    moments: Option<[TextureView; 2]>,
     /// Mean cloud distance and marched limit (m) of the newest frame.
     pub distances: TextureView,
 }
@@ -114,6 +116,10 @@ impl CloudHistory {
             marched_layers,
             held: VecDeque::with_capacity(frame.layers() as usize),
             sums: [0, 1].map(|_| whole(texture("cloud_sum", TextureFormat::Rgba32Float, 1))),
+            moments: key
+                .quality
+                .is_path_traced()
+                .then(|| [0, 1].map(|_| whole(texture("cloud_path_moments", TextureFormat::Rgba32Float, 1)))),
             distances: whole(texture("cloud_distances", TextureFormat::Rg32Float, 1)),
             carried: key.quality.carries_picture().then(|| Carried {
                 marched: [0, 1].map(|_| whole(texture("cloud_picture_marched", TextureFormat::R32Uint, 1))),
@@ -128,13 +134,17 @@ impl CloudHistory {
 
     /// Goes on to the next frame, or starts over where something changed or the last frame was not drawn.
     pub fn advance(&mut self, device: &RenderDevice, key: HistoryKey, pose: Pose, drawn: bool) {
-        let carries = key.quality.carries_picture();
-        if key.size != self.key.size || key.window != self.key.window || carries != self.carried.is_some() {
+        let path_traced = key.quality.is_path_traced();
+        let same_textures =
+            path_traced == self.moments.is_some() && key.quality.carries_picture() == self.carried.is_some();
+        if key.size != self.key.size || key.window != self.key.window || !same_textures {
             *self = Self::new(device, key, pose);
             return;
         }
         let exposed = pose.exposure / self.frame.exposure;
-        let keep = drawn && key == self.key && (0.25..4.0).contains(&exposed) && !pose.is_cut(&self.pose);
+        // Path-traced frames add up without end: nothing may move at all.
+        let goes_on = if path_traced { pose.stands_still(&self.pose, f32::MAX) } else { !pose.is_cut(&self.pose) };
+        let keep = drawn && key == self.key && (0.25..4.0).contains(&exposed) && goes_on;
         self.frame = if keep {
             self.held.push_front(self.pose);
             self.held.truncate(key.window as usize);
@@ -153,7 +163,7 @@ impl CloudHistory {
 
     /// Where the frames held before this one saw what this one sees.
     pub fn held_uniform(&self) -> HeldUniform {
-        let still = self.held.front().is_some_and(|before| self.pose.stands_still(before, self.key.window));
+        let still = self.held.front().is_some_and(|before| self.pose.stands_still(before, self.key.window as f32));
         HeldUniform::new(&self.pose, self.held.iter(), still, self.sparse(), self.key.quality.samples_kept())
     }
 
@@ -207,6 +217,11 @@ impl CloudHistory {
     /// The sum with this frame.
     pub fn sum_after(&self) -> &TextureView {
         &self.sums[(self.frame.index & 1 ^ 1) as usize]
+    }
+    /// The path tracer's moments before and with this frame.
+    pub fn moments(&self) -> Option<[&TextureView; 2]> {
+        let [even, odd] = self.moments.as_ref()?;
+        Some(if self.frame.index & 1 == 0 { [even, odd] } else { [odd, even] })
     }
     /// The newest frame, to be copied.
     pub fn newest_copy(&self) -> TexelCopyTextureInfo<'_> {

@@ -23,7 +23,9 @@ use bevy::{
 
 use crate::model::ModelBindings;
 
-pub use buffer::{CloudBuffer, CloudFrame};
+pub use buffer::{CloudBuffer, CloudFrame, CloudNoise};
+pub(crate) use frame::FrameUniform;
+pub(crate) use pipelines::depth_layout;
 pub use status::CloudStatus;
 pub(crate) use status::StatusFlags;
 
@@ -50,6 +52,8 @@ impl Plugin for CloudRenderPlugin {
         embedded_asset!(app, "accumulate/blend.wesl");
         embedded_asset!(app, "composite/composite.wesl");
         embedded_asset!(app, "composite/publish.wesl");
+        crate::reference::path_tracer::add_shaders(app);
+        app.register_type::<CloudNoise>();
         app.init_resource::<CloudStatus>().register_type::<CloudBuffer>().register_type::<CloudFrame>();
     }
 }
@@ -79,7 +83,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
         )
         .add_systems(
             Core3d,
-            (passes::cloud_sky, passes::cloud_march, passes::cloud_accumulate, passes::cloud_composite)
+            (passes::cloud_sky, passes::cloud_light, passes::cloud_accumulate, passes::cloud_composite)
                 .chain()
                 // Past TAA too: cloud has a history of its own, and TAA would reproject it as the sky it covers.
                 .after(Core3dSystems::MainPass)

@@ -13,7 +13,11 @@ use bevy::{
     },
 };
 
-use super::{bind_groups::CloudBindGroups, history::CloudHistory, view::ExtractedCloudView};
+use super::{
+    bind_groups::{CloudBindGroups, Light},
+    history::CloudHistory,
+    view::ExtractedCloudView,
+};
 
 /// Texels along one side of a workgroup.
 const GROUP: u32 = 8;
@@ -57,17 +61,20 @@ pub(crate) fn cloud_sky(view: ViewQuery<&CloudBindGroups>, cache: Res<PipelineCa
     );
 }
 
-/// One ray a texel.
-pub(crate) fn cloud_march(
+/// One ray or one path a texel.
+pub(crate) fn cloud_light(
     view: ViewQuery<(&CloudBindGroups, &CloudHistory)>,
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
     let (groups, history) = view.into_inner();
-    let (id, own) = &groups.march;
+    let (label, (id, own)) = match &groups.light {
+        Light::March { march, .. } => ("cloud_march", march),
+        Light::PathTrace { trace, .. } => ("cloud_path_trace", trace),
+    };
     dispatch(
         &mut ctx,
-        "cloud_march",
+        label,
         cache.get_compute_pipeline(*id),
         [(&groups.air, &groups.air_offsets), (&groups.model, &[]), (own, &[])],
         workgroups(history.rays()),
@@ -83,14 +90,15 @@ pub(crate) fn cloud_accumulate(
 ) {
     let (groups, history, cloud) = view.into_inner();
     let empty = (&groups.empty, &[][..]);
-    let (id, own) = &groups.accumulate;
-    dispatch(
-        &mut ctx,
-        "cloud_accumulate",
-        cache.get_compute_pipeline(*id),
-        [empty, empty, (own, &[])],
-        workgroups(history.size()),
-    );
+    // The path tracer adds its frames up itself.
+    let after_light = match &groups.light {
+        Light::March { accumulate, .. } => Some(("cloud_accumulate", accumulate)),
+        Light::PathTrace { noise, .. } => noise.as_ref().map(|noise| ("cloud_noise", noise)),
+    };
+    if let Some((label, (id, own))) = after_light {
+        let groups = [empty, empty, (own, &[][..])];
+        dispatch(&mut ctx, label, cache.get_compute_pipeline(*id), groups, workgroups(history.size()));
+    }
     if let Some((id, own)) = &groups.publish {
         dispatch(
             &mut ctx,

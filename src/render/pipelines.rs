@@ -15,7 +15,7 @@ use bevy::{
 };
 
 use super::{frame::FrameUniform, reproject::HeldUniform};
-use crate::{model::ModelBindings, settings::DebugShader};
+use crate::{model::ModelBindings, reference::path_tracer::PathTracer, settings::DebugShader};
 
 /// What a stage's pipeline depends on.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
@@ -24,6 +24,7 @@ pub(crate) struct Variant {
     pub multisampled: bool,
     pub target: TextureFormat,
     pub debug: DebugShader,
+    pub path_traced: bool,
 }
 
 impl Variant {
@@ -50,6 +51,8 @@ pub(crate) struct Pipelines {
     pub blend: CachedComputePipelineId,
     pub composite: CachedRenderPipelineId,
     pub publish: CachedComputePipelineId,
+    /// The path tracer and its noise, where they were asked for.
+    pub traced: Option<[CachedComputePipelineId; 2]>,
 }
 
 /// Layouts, shaders, and the pipelines made so far.
@@ -63,6 +66,7 @@ pub(crate) struct CloudPipelines {
     pub blend: [BindGroupLayoutDescriptor; 2],
     pub composite: [BindGroupLayoutDescriptor; 2],
     pub publish: [BindGroupLayoutDescriptor; 2],
+    pub path_tracer: PathTracer,
     shaders: [Handle<Shader>; 6],
     fullscreen: FullscreenShader,
     made: HashMap<Variant, Pipelines>,
@@ -71,7 +75,7 @@ pub(crate) struct CloudPipelines {
 /// Bytes of `SkyLight` in `sky.wesl`.
 pub(crate) const SKY_LIGHT_BYTES: u64 = 32;
 
-fn depth_layout(multisampled: bool) -> BindGroupLayoutEntryBuilder {
+pub(crate) fn depth_layout(multisampled: bool) -> BindGroupLayoutEntryBuilder {
     if multisampled { texture_depth_2d_multisampled() } else { texture_depth_2d() }
 }
 
@@ -198,6 +202,7 @@ impl FromWorld for CloudPipelines {
                 load_embedded_asset!(world, "composite/publish.wesl"),
                 load_embedded_asset!(world, "accumulate/blend.wesl"),
             ],
+            path_tracer: PathTracer::from_world(world),
             fullscreen: world.resource::<FullscreenShader>().clone(),
             made: HashMap::default(),
         }
@@ -210,23 +215,34 @@ impl CloudPipelines {
         if let Some(made) = self.made.get(&variant) {
             return *made;
         }
-        // A debug view shares all but the march with the normal variant.
-        let plain = (variant.debug != DebugShader::None)
-            .then(|| self.get(cache, model, Variant { debug: DebugShader::None, ..variant }));
+        // A debug view shares all but the march with the normal variant, and the path tracer all that comes after it.
+        let plain = (variant.debug != DebugShader::None || variant.path_traced)
+            .then(|| self.get(cache, model, Variant { debug: DebugShader::None, path_traced: false, ..variant }));
         let defs = variant.definitions();
         let ms = usize::from(variant.multisampled);
         let air = if variant.atmosphere { &self.air } else { &self.empty };
-        let compute = |label: &'static str, shader: usize, layout: [&BindGroupLayoutDescriptor; 3]| {
+        let compute_with = |label: &'static str, shader: &Handle<Shader>, layout: [&BindGroupLayoutDescriptor; 3]| {
             cache.queue_compute_pipeline(ComputePipelineDescriptor {
                 label: Some(label.into()),
                 layout: layout.into_iter().cloned().collect(),
-                shader: self.shaders[shader].clone(),
+                shader: shader.clone(),
                 shader_defs: defs.clone(),
                 entry_point: Some("main".into()),
                 ..default()
             })
         };
+        let compute = |label, shader: usize, layout| compute_with(label, &self.shaders[shader], layout);
         if let Some(plain) = plain {
+            if variant.path_traced {
+                let PathTracer { trace, noise, trace_shader, noise_shader } = &self.path_tracer;
+                let traced = [
+                    compute_with("cloud_path_trace", trace_shader, [air, &model.layout, &trace[ms]]),
+                    compute_with("cloud_noise", noise_shader, [&self.empty, &self.empty, noise]),
+                ];
+                let made = Pipelines { traced: Some(traced), ..plain };
+                self.made.insert(variant, made);
+                return made;
+            }
             let march = compute("cloud_march", 1, [air, &model.layout, &self.march[ms]]);
             let made = Pipelines { march, ..plain };
             self.made.insert(variant, made);
@@ -270,6 +286,7 @@ impl CloudPipelines {
             blend: compute("cloud_blend", 5, [&self.empty, &self.empty, &self.blend[ms]]),
             composite,
             publish: compute("cloud_publish", 4, [&self.empty, &self.empty, &self.publish[ms]]),
+            traced: None,
         };
         self.made.insert(variant, made);
         made
@@ -286,6 +303,7 @@ impl Pipelines {
     pub fn drawable(self, cache: &PipelineCache) -> bool {
         [self.sky, self.drawable_march(cache), self.accumulate, self.blend, self.publish]
             .iter()
+            .chain(self.traced.iter().flatten())
             .all(|id| cache.get_compute_pipeline(*id).is_some())
             && cache.get_render_pipeline(self.composite).is_some()
     }

@@ -41,10 +41,8 @@ impl Pose {
         (self.position - before.position).as_vec3() - self.drift(before)
     }
 
-    /// Whether a window may go on by adding frames up as they are, all its frames differing as these two neighbours
-    /// do: the camera must not move at all, clouds and sun by less than shows within a window.
-    pub fn stands_still(&self, before: &Self, window: u32) -> bool {
-        let frames = window as f32;
+    /// Whether so many frames may be added up as they are, each differing from the next as these two neighbours do: the camera must not move at all, clouds and sun by less than shows within a window.
+    pub fn stands_still(&self, before: &Self, frames: f32) -> bool {
         let camera = self.clip_from_view == before.clip_from_view
             && self.position.distance(before.position) < 1e-3
             && self.rotation.abs_diff_eq(before.rotation, 1e-5);
@@ -173,7 +171,7 @@ mod tests {
     #[test]
     fn a_breeze_is_still_and_motion_is_not() {
         let before = pose();
-        assert!(Pose { seconds: 1.0 / 60.0, ..before }.stands_still(&before, 8));
+        assert!(Pose { seconds: 1.0 / 60.0, ..before }.stands_still(&before, 8.0));
         for moved in [
             Pose { position: DVec3::X, ..before },
             Pose { rotation: Quat::from_rotation_y(0.01), ..before },
@@ -181,9 +179,18 @@ mod tests {
             Pose { sun: Sun { direction: Vec3::new(0.01, 1.0, 0.0), ..before.sun }, ..before },
             Pose { clip_from_view: lens(1.1), ..before },
         ] {
-            assert!(!moved.stands_still(&before, 8), "{moved:?}");
+            assert!(!moved.stands_still(&before, 8.0), "{moved:?}");
             assert!(!moved.is_cut(&before), "{moved:?}");
         }
+    }
+
+    #[test]
+    fn without_end_nothing_may_move() {
+        let still = pose();
+        assert!(still.stands_still(&still, f32::MAX));
+        assert!(!Pose { seconds: 1e-6, ..still }.stands_still(&still, f32::MAX));
+        let sun = Sun { direction: Vec3::new(1e-5, 1.0, 0.0), ..still.sun };
+        assert!(!Pose { sun, ..still }.stands_still(&still, f32::MAX));
     }
 
     #[test]

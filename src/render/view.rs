@@ -15,7 +15,7 @@ use bevy::{
 };
 
 use super::{
-    CloudBuffer, CloudFrame, StatusFlags,
+    CloudBuffer, CloudFrame, CloudNoise, StatusFlags,
     bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey},
@@ -46,6 +46,13 @@ pub(crate) struct ExtractedCloudView {
     pub debug: CloudDebugView,
     pub buffer: Option<AssetId<Image>>,
     pub frame: Option<AssetId<Image>>,
+    pub noise: Option<AssetId<Image>>,
+}
+
+impl ExtractedCloudView {
+    pub fn is_path_traced(&self) -> bool {
+        self.quality.is_path_traced()
+    }
 }
 
 /// A view's uniforms.
@@ -63,6 +70,7 @@ type CameraItems = (
     Option<&'static CloudView>,
     Option<&'static CloudBuffer>,
     Option<&'static CloudFrame>,
+    Option<&'static CloudNoise>,
 );
 
 /// What a view has of ours while it shows clouds.
@@ -92,7 +100,7 @@ pub(crate) fn extract_views(
     had: Query<(), With<ExtractedCloudView>>,
     mut warned: Local<Option<String>>,
 ) {
-    for (entity, camera, view, buffer, frame) in &cameras {
+    for (entity, camera, view, buffer, frame, noise) in &cameras {
         let Some(view) = view.filter(|v| v.enabled && camera.is_active) else {
             if had.contains(entity) {
                 commands.entity(entity).remove::<Ours>();
@@ -118,6 +126,7 @@ pub(crate) fn extract_views(
             debug: view.debug,
             buffer: buffer.map(|b| b.0.id()),
             frame: frame.map(|f| f.0.id()),
+            noise: noise.map(|n| n.0.id()),
         });
     }
 }

@@ -19,13 +19,17 @@ pub use lighting::{CloudLighting, PhaseFunction};
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
 pub use preset::{CloudPreset, PresetError};
-pub use quality::{CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
+pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
 pub use view::{CloudClock, CloudView};
 
 /// The last good value of each setting: what the renderer sees. A bad change is reported once and ignored.
 #[derive(Resource, Clone, Debug, Default)]
 pub(crate) struct GoodSettings(pub CloudSettings);
+
+/// Where [`GoodSettings`] takes in what has changed, in `Last`.
+#[derive(SystemSet, Clone, PartialEq, Eq, Hash, Debug)]
+pub(crate) struct KeepGood;
 
 /// Settings resources, their types, checks and clock.
 pub(crate) struct CloudSettingsPlugin;
@@ -66,7 +70,8 @@ impl Plugin for CloudSettingsPlugin {
                     keep_good::<CloudTextures>,
                     keep_good::<CloudClock>,
                 )
-                    .chain(),
+                    .chain()
+                    .in_set(KeepGood),
             );
     }
 }

@@ -27,6 +27,22 @@ impl MarchResolution {
     }
 }
 
+/// How the light that clouds send to the camera is found.
+#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+pub enum CloudMethod {
+    /// A ray march with the lighting model of [`CloudLighting`](super::CloudLighting); the default.
+    #[default]
+    March,
+    /// One path a pixel and frame, of any length, averaged for as long as nothing moves: the truth that the march
+    /// approximates, for stills and for judging the rest. It reads the model, sun, sky, phase function (in full, without
+    /// `phase_limit`), ground albedo, cut-off distance, fade and aerial perspective, and nothing else of lighting and
+    /// quality. Hundreds of frames make a picture; see [`CloudNoise`](crate::CloudNoise). Objects of the scene hide
+    /// clouds, but cast no shadow on them. Where [`ModelShader`](crate::ModelShader) lacks `extinction_bound`, nothing is
+    /// drawn.
+    PathTrace,
+}
+
 /// How frames are combined over time.
 #[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
 #[reflect(Default, Serialize, Deserialize, PartialEq)]
@@ -74,18 +90,22 @@ pub enum Integration {
     /// Exact for a constant medium within the step, whatever its length (thesis, equation 8); the default.
     #[default]
     EnergyConserving,
-    /// `L·σs·Δ` weighted by the transmittance at the step's start: too bright for long steps. For comparison.
+    /// `L·σs·Δ` weighted by the transmittance at the step's end (thesis 4.3, figure 5.11): too dark for long steps. For
+    /// comparison.
     Naive,
 }
 
 /// Steps, thresholds, resolution and temporal mode.
 ///
 /// A resource for all views; [`CloudView::quality`](super::CloudView::quality) overrides it for one. Start from
-/// [`low`](Self::low), [`medium`](Self::medium), [`high`](Self::high) (the default) or [`ultra`](Self::ultra).
+/// [`low`](Self::low), [`medium`](Self::medium), [`high`](Self::high) (the default), [`ultra`](Self::ultra) or
+/// [`reference`](Self::reference).
 #[derive(Resource, Reflect, Serialize, Deserialize, Clone, PartialEq, Debug)]
 #[reflect(Resource, Default, Serialize, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudQuality {
+    /// How light is found. Default [`CloudMethod::March`].
+    pub method: CloudMethod,
     /// Size of the marched buffer. Cost falls with its area. Default [`MarchResolution::Half`].
     pub resolution: MarchResolution,
     /// Length of a step inside cloud near the camera (m). Cost is inverse to it. Default 90.
@@ -141,6 +161,9 @@ pub struct CloudQuality {
     pub alpha: f32,
     /// What [`TemporalMode::Upscale`] marches a frame. Default [`UpscaleBlock::Two`].
     pub block: UpscaleBlock,
+    /// Random numbers of [`CloudMethod::PathTrace`]: another seed makes another, independent picture. Default 0.
+    #[reflect(@0..=4_294_967_295_u32)]
+    pub seed: u32,
 }
 
 impl Default for CloudQuality {
@@ -182,6 +205,7 @@ impl CloudQuality {
     /// The default: half resolution, 8 frames, 90 km.
     pub fn high() -> Self {
         Self {
+            method: CloudMethod::March,
             resolution: MarchResolution::Half,
             step: 90.0,
             step_growth: 0.008,
@@ -201,6 +225,7 @@ impl CloudQuality {
             window: 8,
             alpha: 0.05,
             block: UpscaleBlock::Two,
+            seed: 0,
         }
     }
 
@@ -222,20 +247,39 @@ impl CloudQuality {
         }
     }
 
-    /// The preset of this name (`low`, `medium`, `high`, `ultra`), if there is one.
+    /// The truth, for stills: [`CloudMethod::PathTrace`] at every pixel, 150 km. Noise falls with the square root of the
+    /// frames drawn while nothing moves.
+    pub fn reference() -> Self {
+        Self { method: CloudMethod::PathTrace, resolution: MarchResolution::Full, ..Self::ultra() }
+    }
+
+    /// The preset of this name (`low`, `medium`, `high`, `ultra`, `reference`), if there is one.
     pub fn named(name: &str) -> Option<Self> {
         Some(match name {
             "low" => Self::low(),
             "medium" => Self::medium(),
             "high" => Self::high(),
             "ultra" => Self::ultra(),
+            "reference" => Self::reference(),
             _ => return None,
         })
     }
 
-    /// Frames held: `window` for [`TemporalMode::SlidingWindow`], else 1.
+    /// Whether [`CloudMethod::PathTrace`] is chosen.
+    pub(crate) fn is_path_traced(&self) -> bool {
+        self.method == CloudMethod::PathTrace
+    }
+
+    /// Pixels a texel of the clouds spans along each axis: those of the resolution, 1 where paths are traced.
+    pub(crate) fn divisor(&self) -> u32 {
+        if self.is_path_traced() { 1 } else { self.resolution.divisor() }
+    }
+
+    /// Frames held: `window` for [`TemporalMode::SlidingWindow`], else 1; 1 too where paths are traced, whose sum alone is
+    /// kept.
     pub fn held_frames(&self) -> u32 {
         match self.temporal {
+            _ if self.is_path_traced() => 1,
             TemporalMode::Off | TemporalMode::Exponential | TemporalMode::Upscale => 1,
             TemporalMode::SlidingWindow => self.window.clamp(1, 16),
         }
@@ -243,12 +287,12 @@ impl CloudQuality {
 
     /// Whether one picture is carried on from frame to frame, in place of a window of frames.
     pub(crate) fn carries_picture(&self) -> bool {
-        matches!(self.temporal, TemporalMode::Exponential | TemporalMode::Upscale)
+        !self.is_path_traced() && matches!(self.temporal, TemporalMode::Exponential | TemporalMode::Upscale)
     }
 
     /// Texels along one side of the blocks of which one is marched a frame.
     pub(crate) fn block_side(&self) -> u32 {
-        if self.temporal == TemporalMode::Upscale { self.block.side() } else { 1 }
+        if self.carries_picture() && self.temporal == TemporalMode::Upscale { self.block.side() } else { 1 }
     }
 
     /// Samples that a texel of a carried picture is the mean of; older ones fade.

@@ -75,7 +75,7 @@ pub(super) fn extract(
 
 /// What a slot shows, as far as one can tell two of them apart.
 #[derive(Clone, PartialEq, Debug)]
-enum Content {
+pub(super) enum Content {
     Made(Recipe),
     Image { image: AssetId<Image>, revision: u32 },
 }
@@ -140,6 +140,11 @@ impl Bakery {
     /// The texture that a slot shows.
     pub(super) fn texture(&self, slot: CloudTextureSlot) -> Option<&Texture> {
         self.bound[slot as usize].as_ref().map(|bound| &bound.texture)
+    }
+
+    /// The texture that a slot shows, and what tells it from others.
+    pub(super) fn shown(&self, slot: CloudTextureSlot) -> Option<(&Content, &Texture)> {
+        self.bound[slot as usize].as_ref().map(|bound| (&bound.content, &bound.texture))
     }
 
     fn shows(&self, slot: CloudTextureSlot, content: &Content) -> bool {

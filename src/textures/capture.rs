@@ -7,13 +7,13 @@ use bevy::{
         render_resource::{
             BufferDescriptor, BufferUsages, CommandEncoderDescriptor, Extent3d, MapMode, Origin3d, PollType,
             TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, TextureAspect, TextureDimension,
-            TextureFormat, TextureUsages,
+            TextureUsages,
         },
         renderer::{RenderDevice, RenderQueue},
     },
 };
 
-use super::{CloudTextureSlot, CloudTextureViews, bake::Bakery};
+use super::{CloudTextureSlot, CloudTextureViews, bake::Bakery, texel::decoder};
 
 /// One level of a texture, in the order x, y, z.
 #[derive(Clone, PartialEq, Debug)]
@@ -63,6 +63,7 @@ pub fn read(app: &App, slot: CloudTextureSlot, level: u32) -> Result<Captured, S
     let whole = texture.size();
     let depth = if texture.dimension() == TextureDimension::D3 { whole.depth_or_array_layers >> level } else { 1 };
     let size = UVec3::new(whole.width >> level, whole.height >> level, depth).max(UVec3::ONE);
+    let decode = decoder(texture.format()).ok_or_else(|| format!("cannot decode {:?}", texture.format()))?;
     let texel_bytes = texture.format().block_copy_size(None).ok_or("unknown format")?;
     let row_bytes = (size.x * texel_bytes).next_multiple_of(256);
     let buffer = device.create_buffer(&BufferDescriptor {
@@ -88,33 +89,8 @@ pub fn read(app: &App, slot: CloudTextureSlot, level: u32) -> Result<Captured, S
     for row in bytes.chunks_exact(row_bytes as usize) {
         let row = &row[..(size.x * texel_bytes) as usize];
         for texel in row.chunks_exact(texel_bytes as usize) {
-            texels.push(decode(texel, texture.format())?);
+            texels.push(decode(texel));
         }
     }
     Ok(Captured { size, texels })
-}
-
-fn decode(bytes: &[u8], format: TextureFormat) -> Result<[f32; 4], String> {
-    let mut texel = [0.0, 0.0, 0.0, 1.0];
-    match format {
-        TextureFormat::R8Unorm | TextureFormat::Rg8Unorm | TextureFormat::Rgba8Unorm => {
-            for (channel, byte) in texel.iter_mut().zip(bytes) {
-                *channel = f32::from(*byte) / 255.0;
-            }
-        }
-        TextureFormat::R16Float | TextureFormat::Rg16Float | TextureFormat::Rgba16Float => {
-            for (channel, pair) in texel.iter_mut().zip(bytes.chunks_exact(2)) {
-                *channel = half(u16::from_le_bytes([pair[0], pair[1]]));
-            }
-        }
-        other => return Err(format!("cannot decode {other:?}")),
-    }
-    Ok(texel)
-}
-
-/// An IEEE 754 half as a float. Infinities and NaN are not expected in these textures.
-fn half(bits: u16) -> f32 {
-    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023) / 1024.0);
-    sign * if exponent == 0 { fraction * 2f32.powi(-14) } else { (1.0 + fraction) * 2f32.powi(exponent - 15) }
 }

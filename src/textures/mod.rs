@@ -17,13 +17,16 @@ mod bake;
 pub mod blue_noise;
 #[doc(hidden)]
 pub mod capture;
+pub(crate) mod cpu_copies;
 mod job;
 pub mod n_rooks;
 mod pipelines;
 mod profile;
 mod progress;
+pub(crate) mod readback;
 mod recipe;
 mod slots;
+mod texel;
 
 use std::sync::atomic::Ordering::Relaxed;
 

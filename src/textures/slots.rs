@@ -44,11 +44,14 @@ impl std::fmt::Display for CloudTextureSlot {
 }
 
 impl CloudTextureSlot {
-    pub(super) const COUNT: usize = 6;
+    pub(crate) const COUNT: usize = 6;
 
     /// All slots, the quick ones first.
     pub(super) const BAKE_ORDER: [Self; Self::COUNT] =
         [Self::BlueNoise, Self::Gradient, Self::Coverage, Self::TypeMap, Self::Billow, Self::Wisp];
+
+    /// Those that say where cloud is.
+    pub(crate) const OF_MODEL: [Self; 5] = [Self::Gradient, Self::Coverage, Self::TypeMap, Self::Billow, Self::Wisp];
 
     fn handle(self, slots: &CloudTextureSlots) -> Option<&Handle<Image>> {
         match self {

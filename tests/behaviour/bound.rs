@@ -11,11 +11,11 @@ use crate::{
 
 /// One question: p and lod for the bound, q and its lod for the medium.
 type Question = [f32; 8];
-/// Bound, density, extinction, profile.
-type Answer = [f32; 4];
+/// Bound, density, extinction, profile, bound of the extinction.
+type Answer = [f32; 5];
 
 const ASK: &str = "
-import bevy_cumulus::model::model::{density_bound, sample_medium};
+import bevy_cumulus::model::model::{density_bound, extinction_bound, sample_medium};
 
 @group(0) @binding(0) var<storage, read> values: array<f32>;
 @group(0) @binding(1) var<storage, read_write> results: array<f32>;
@@ -29,11 +29,12 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {
     let p = vec3<f32>(values[i], values[i + 1u], values[i + 2u]);
     let q = vec3<f32>(values[i + 4u], values[i + 5u], values[i + 6u]);
     let medium = sample_medium(q, values[i + 7u]);
-    let o = id.x * 4u;
+    let o = id.x * 5u;
     results[o] = density_bound(p, values[i + 3u]);
     results[o + 1u] = medium.density;
     results[o + 2u] = medium.extinction;
     results[o + 3u] = medium.profile;
+    results[o + 4u] = extinction_bound(p, values[i + 3u]);
 }
 ";
 
@@ -54,7 +55,7 @@ fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer>
     let camera = DVec3::new(12_345.0, 10.0, -6789.0);
     let group = ModelShader::bindings(app, camera).expect("the model can be bound");
     let count = questions.len();
-    let answers = run_compute_with(app, ASK, Some(&group), questions.as_flattened(), 4 * count, count as u32);
+    let answers = run_compute_with(app, ASK, Some(&group), questions.as_flattened(), 5 * count, count as u32);
     answers.as_chunks().0.to_vec()
 }
 
@@ -107,12 +108,14 @@ fn nothing_is_denser_than_the_bound_around_it() {
         let answers = ask(&mut app, &model, &questions);
         let (mut empty, mut cloud, mut close) = (0, 0, 0.0_f32);
         for (question, answer) in questions.iter().zip(&answers) {
-            let [bound, density, extinction, profile] = *answer;
+            let [bound, density, extinction, profile, extinction_bound] = *answer;
             assert!(answer.iter().all(|v| v.is_finite() && *v >= 0.0), "model {k}: {question:?}: {answer:?}");
             assert!(bound > 0.0 || density == 0.0, "model {k}: {question:?}: {density} where the bound is 0");
             // Of rounding: both are sums of a few products.
             let allowed = bound + model.density * 1e-5;
             assert!(density <= allowed, "model {k}: {question:?}: {density} > {bound}");
+            // The path tracer's majorant.
+            assert!(extinction <= extinction_bound + model.extinction * allowed * 1e-5, "model {k}: {question:?}");
             assert!((extinction - density * model.extinction).abs() <= 1e-6 * extinction);
             assert!(density == 0.0 || profile > 0.0, "model {k}: {question:?}: {answer:?}");
             empty += u32::from(bound == 0.0);
@@ -237,7 +240,7 @@ fn density_is_finite_for_every_setting_that_is_allowed() {
             questions.extend([-20.0, 0.0, 30.0].map(|lod| at(p, lod)));
         }
         for (question, answer) in questions.iter().zip(ask(&mut app, &model, &questions)) {
-            let [bound, density, extinction, _] = answer;
+            let [bound, density, extinction, ..] = answer;
             assert!(answer.iter().all(|v| v.is_finite() && *v >= 0.0), "model {k}: {question:?}: {answer:?}");
             assert!(density <= model.density && bound <= model.density, "model {k}: {question:?}: {answer:?}");
             assert!(extinction <= model.density * model.extinction, "model {k}: {question:?}: {answer:?}");

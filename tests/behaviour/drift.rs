@@ -19,7 +19,7 @@ use bevy::{
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::{
-    gpu::{read_mapped, run_updates, wait_for_gpu},
+    gpu::{read_mapped, run_until, run_updates, wait_for_gpu},
     halves::{from_half, worst_relative},
     view::clouds_app,
 };
@@ -97,14 +97,15 @@ fn pipeline(app: &mut App) -> ComputePipeline {
         ..default()
     };
     let id = app.sub_app(RenderApp).world().resource::<PipelineCache>().queue_compute_pipeline(descriptor);
-    for _ in 0..100 {
-        run_updates(app, 1);
+    let mut pipeline = None;
+    run_until(app, "the accumulation stage compiles", 100, |app| {
         let cache = app.sub_app(RenderApp).world().resource::<PipelineCache>();
         if let CachedPipelineState::Ok(Pipeline::ComputePipeline(made)) = cache.get_compute_pipeline_state(id) {
-            return made.clone();
+            pipeline = Some(made.clone());
         }
-    }
-    panic!("the accumulation stage does not compile");
+        pipeline.is_some()
+    });
+    pipeline.expect("it was waited for")
 }
 
 impl Accumulation {

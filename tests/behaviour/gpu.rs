@@ -8,6 +8,7 @@ use std::{
         Mutex, Once, PoisonError,
         atomic::{AtomicU32, Ordering},
     },
+    time::{Duration, Instant},
 };
 
 use bevy::{
@@ -34,8 +35,10 @@ use bevy::{
     winit::WinitPlugin,
 };
 
-/// Updates after which a shader that still waits for an import is given up.
-const COMPILE_UPDATES: u32 = 30;
+/// How long something may take that waits for files, which other threads load while frames are counted.
+const PATIENCE: Duration = Duration::from_secs(60);
+/// How long a test's own shader may wait for a module that it imports.
+const COMPILE_PATIENCE: Duration = Duration::from_secs(5);
 
 /// Whether the tests run under WebGPU's limits, where Bevy's own `Atmosphere` fails validation.
 pub fn webgpu_limits() -> bool {
@@ -144,15 +147,20 @@ pub fn run_updates(app: &mut App, count: u32) {
     }
 }
 
-/// Runs frames until `done`; fails after `limit` of them, naming `what` was awaited.
+/// Runs frames until `done`; fails after `limit` of them, naming `what` was awaited, but never before [`PATIENCE`] is
+/// over: on a busy machine many frames pass while a file loads.
 pub fn run_until(app: &mut App, what: &str, limit: u32, mut done: impl FnMut(&mut App) -> bool) {
-    for _ in 0..limit {
-        if done(app) {
-            return;
-        }
+    let (start, mut frames) = (Instant::now(), 0);
+    while !done(app) {
+        assert!(frames < limit || start.elapsed() < PATIENCE, "{what}: not after {frames} frames");
         run_updates(app, 1);
+        frames += 1;
     }
-    assert!(done(app), "{what}: not after {limit} frames");
+}
+
+/// Whether every pipeline that was asked for is there (or has failed): none waits for a shader's file.
+pub fn pipelines_are_there(app: &App) -> bool {
+    app.sub_app(RenderApp).world().resource::<PipelineCache>().waiting_pipelines().next().is_none()
 }
 
 /// Fails with the compiler's text where a shader of the app does not compile.
@@ -224,8 +232,8 @@ fn compile(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> 
         ..default()
     };
     let id = app.sub_app(RenderApp).world().resource::<PipelineCache>().queue_compute_pipeline(descriptor);
-    let mut waiting_for = String::new();
-    for _ in 0..COMPILE_UPDATES {
+    let (start, mut waiting_for) = (Instant::now(), String::new());
+    while start.elapsed() < COMPILE_PATIENCE {
         app.update();
         let cache = app.sub_app(RenderApp).world().resource::<PipelineCache>();
         match cache.get_compute_pipeline_state(id) {
@@ -237,14 +245,17 @@ fn compile(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> 
             }
             CachedPipelineState::Err(
                 error @ (ShaderCacheError::ShaderNotLoaded(_) | ShaderCacheError::ShaderImportNotYetAvailable),
-            ) => waiting_for = error.to_string(),
+            ) => {
+                waiting_for = error.to_string();
+                std::thread::sleep(Duration::from_millis(5));
+            }
             CachedPipelineState::Err(error) => {
                 panic!("the shader does not compile: {error}\n{wesl}")
             }
             _ => {}
         }
     }
-    panic!("the shader is not ready after {COMPILE_UPDATES} updates: {waiting_for}\n{wesl}");
+    panic!("the shader is not ready after {COMPILE_PATIENCE:?}: {waiting_for}\n{wesl}");
 }
 
 fn dispatch(

@@ -172,6 +172,7 @@ fn mistakes_are_named_and_nothing_is_written() {
         (&["--debug", "xray"], &["--debug", "xray", "coverage_map"]),
         (&["--scene", "thesis_coverage_sweep"], &["thesis_coverage_sweep", "strip", "--cloud"]),
         (&["--quality", "best"], &["--quality", "best", "ultra"]),
+        (&["--noise", "noise.exr"], &["--noise", "reference"]),
         (&["--size", "0x36"], &["--size", "0x36", "8192"]),
         (&["--size", "64x8193"], &["--size", "64x8193"]),
         (&["--frames", "0"], &["--frames", "100000"]),
@@ -229,6 +230,21 @@ fn the_cloud_buffer_holds_cloud_and_clear_sky() {
     // Sunlit cloud is some thousands of cd/m²: exposure is divided out.
     let brightest = cloudy.iter().map(|p| p.0[1]).fold(0.0, f32::max);
     assert!((2.0e3..2.0e5).contains(&brightest), "{brightest} cd/m²");
+}
+
+#[test]
+fn the_reference_makes_a_picture_and_knows_its_noise() {
+    let view = ["--scene", "ground_noon", "--size", "32x18", "--quality", "reference"];
+    let files = ["--frames", "5", "--out", "shot.png", "--cloud", "cloud.exr", "--noise", "noise.exr"];
+    let folder = render(&[&view[..], &files].concat());
+    let (cloud, noise) = (read_cloud(&folder.join("cloud.exr")), read_cloud(&folder.join("noise.exr")));
+    assert_eq!(read(&folder.join("shot.png")).to_rgb8().dimensions(), (32, 18));
+    assert!(noise.pixels().all(|p| p.0[2] == 5.0 && p.0[3] == 0.0), "not 5 samples, or weight was lost");
+    for (cloud, noise) in cloud.pixels().zip(noise.pixels()) {
+        let clear = cloud.0 == [0.0, 0.0, 0.0, 1.0];
+        assert!(noise.0[0] >= 0.0 && (!clear || noise.0[..2] == [0.0, 0.0]), "{cloud:?} ± {noise:?}");
+    }
+    assert!(noise.pixels().filter(|p| p.0[0] > 0.0).count() > 50, "where there is cloud there is noise");
 }
 
 #[test]
@@ -296,4 +312,51 @@ fn without_sky_and_cloud_the_picture_is_black_above() {
     let folder = render(&[&files[..], &clear].concat());
     assert!(read(&folder.join("shot.png")).to_rgb8().pixels().all(|p| p.0 == [0; 3]));
     assert!(read_cloud(&folder.join("cloud.exr")).pixels().all(|p| p.0 == [0.0, 0.0, 0.0, 1.0]));
+}
+
+#[test]
+fn a_batch_makes_the_pictures_that_its_lines_make_alone() {
+    let still = ["--size", "32x18", "--frames", "1", "--set", "quality.temporal=off", "--set", "quality.offsets=false"];
+    let lines = ["--set model.coverage=0.3", "--set model.coverage=-0.2 --set quality.resolution=quarter --time 50"];
+    let folder = Folder::new();
+    let numbered = (1..).zip(lines).map(|(n, line)| format!("{line} --cloud {n}.exr # {n}\n\n")).collect::<String>();
+    fs::write(folder.join("batch.txt"), numbered).expect("the folder can be written");
+    let output = run_in(&folder, &[&still[..], &SMALL, &["--batch", "batch.txt"]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    assert_eq!(String::from_utf8_lossy(&output.stdout), "[1/2] 1.exr\n[2/2] 2.exr\n");
+    for (n, line) in (1..).zip(lines) {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let alone = render(&[&still[..], &words, &["--cloud", "cloud.exr"]].concat());
+        let (one, other) = (read_cloud(&alone.join("cloud.exr")), read_cloud(&folder.join(format!("{n}.exr"))));
+        assert!(one == other, "picture {n} of the batch differs from the one made alone");
+    }
+}
+
+#[test]
+fn a_mistake_in_a_batch_is_named_with_its_line() {
+    let cases = [
+        ("--out a.png\n--set model.colour=1 --out b.png", "line 2", "model.colour"),
+        ("--out a.png\n\n--size 16x16 --out b.png", "line 3", "--size"),
+        ("--out a.png\n--set textures.seed=9 --out b.png", "line 2", "textures"),
+        ("--frames 4", "line 1", "--out"),
+        ("# nothing", "batch.txt", "no picture"),
+        ("--batch again.txt --out a.png", "line 1", "no picture"),
+    ];
+    let folder = Folder::new();
+    for (text, at, what) in cases {
+        fs::write(folder.join("batch.txt"), text).expect("the folder can be written");
+        let output = run_in(&folder, &["--batch", "batch.txt"]);
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert!(!output.status.success() && said.contains(at) && said.contains(what), "{text}: {said}");
+        assert!(!said.contains("panicked") && !folder.join("a.png").exists(), "{text}: {said}");
+    }
+}
+
+#[test]
+fn effective_prints_the_settings_and_renders_nothing() {
+    let options = ["--effective", "--scene", "sunset", "--quality", "low", "--set", "model.density=0.7"];
+    let output = run_in(&Folder::new(), &options);
+    let all: Value = serde_json::from_slice(&output.stdout).expect("JSON");
+    assert_eq!((&all["quality"]["resolution"], &all["scene"]), (&"Quarter".into(), &"sunset".into()));
+    assert_eq!(all["model"]["density"], 0.7);
 }

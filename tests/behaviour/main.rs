@@ -1,11 +1,13 @@
 //! What the crate does, by behaviour. GPU tests run on whatever Vulkan device there is, a software one too, and fail
 //! where there is none.
 
+mod adding;
 mod bad_input;
 mod bound;
 mod cameras;
 mod debug_views;
 mod drift;
+mod field;
 mod goldens;
 mod gpu;
 mod halves;
@@ -13,6 +15,7 @@ mod headless;
 mod intervals;
 mod motion;
 mod occlusion;
+mod path_tracer;
 mod phases;
 mod sampling_patterns;
 mod schedule;
@@ -20,6 +23,7 @@ mod settings;
 mod shaders;
 mod slab;
 mod stage;
+mod stall;
 mod textures;
 mod twins;
 mod view;

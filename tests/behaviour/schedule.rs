@@ -9,13 +9,15 @@ use bevy::{
     render::{ExtractSchedule, Render, RenderApp, renderer::RenderGraph},
 };
 
-use crate::view::{Sky, clouds_app, spawn_sun, spawn_view, until_drawn};
+use bevy_cumulus::prelude::*;
+
+use crate::view::{Sky, clouds_app_with, spawn_sun, spawn_view, until_drawn};
 
 const OURS: &str = "bevy_cumulus::";
 
 /// An app that draws, so that every schedule has been built.
 fn drawn() -> App {
-    let mut app = clouds_app();
+    let mut app = clouds_app_with((CloudsPlugin, CloudFieldPlugin));
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     spawn_view(&mut app, UVec2::new(8, 8), Transform::default(), Sky::Atmosphere);
     until_drawn(&mut app);
@@ -77,7 +79,7 @@ fn passes_run_after_the_scene_and_before_tone_mapping() {
         "::main_opaque_pass_3d",
         "::main_transparent_pass_3d",
         "::cloud_sky",
-        "::cloud_march",
+        "::cloud_light",
         "::cloud_accumulate",
         "::cloud_composite",
         "::tonemapping",

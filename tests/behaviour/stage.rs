@@ -12,7 +12,7 @@ use bevy::{
 use bevy_cumulus::{ModelShader, prelude::*};
 
 use crate::{
-    gpu::run_updates,
+    gpu::{pipelines_are_there, run_until, run_updates},
     view::{Sky, View, clouds_app_with, read_image, spawn_sun, spawn_view},
 };
 
@@ -85,6 +85,10 @@ pub fn linear_pixels(app: &App, view: &View) -> Vec<Vec3> {
 /// Enough frames for a change to be in the picture: new pipelines, meshes and textures included.
 pub fn settle(app: &mut App) {
     run_updates(app, 3);
+    if !pipelines_are_there(app) {
+        run_until(app, "new pipelines", 100, |app| pipelines_are_there(app));
+        run_updates(app, 2);
+    }
 }
 
 /// The picture with this view's clouds turned off; they are on again afterwards.

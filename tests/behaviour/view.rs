@@ -20,7 +20,9 @@ use bevy::{
 };
 use bevy_cumulus::prelude::*;
 
-use crate::gpu::{app_with, assert_shaders_compile, read_mapped, run_until, run_updates, webgpu_limits};
+use crate::gpu::{
+    app_with, assert_shaders_compile, pipelines_are_there, read_mapped, run_until, run_updates, webgpu_limits,
+};
 
 /// What is behind the clouds.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -99,11 +101,12 @@ pub fn spawn_view(app: &mut App, size: UVec2, transform: Transform, sky: Sky) ->
     View { camera, target, clouds, size }
 }
 
-/// Runs frames until clouds are drawn; fails if that takes more than 600, or if a shader does not compile.
+/// Runs frames until clouds are drawn, and all else that the camera sees; fails if that takes too long, or if a shader
+/// does not compile.
 pub fn until_drawn(app: &mut App) {
     run_until(app, "clouds are drawn", 600, |app| {
         assert_shaders_compile(app);
-        app.world().resource::<CloudStatus>().is_ready()
+        app.world().resource::<CloudStatus>().is_ready() && pipelines_are_there(app)
     });
 }
 

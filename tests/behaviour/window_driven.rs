@@ -1,10 +1,12 @@
 //! The windowed examples, driven as a hand drives them: a real window on a virtual X server, keys, a dragged slider.
 //!
-//! What must come is waited for. There is no window manager, so that a window lies where the test says, at 0, 0.
+//! What must come is waited for. There is no window manager, so that a window lies where the test says, at 0, 0; but for
+//! the test of what a window manager does.
 
 mod screen;
 
 use std::{
+    process::Command,
     thread::sleep,
     time::{Duration, Instant},
 };
@@ -12,7 +14,7 @@ use std::{
 use bevy_cumulus::settings::CloudPreset;
 
 use crate::gpu::webgpu_limits;
-use screen::{PATIENCE, Part, Picture, SCREEN, Screen, wait};
+use screen::{PATIENCE, Part, Picture, SCREEN, Screen, binary, wait};
 
 // Where things are in a window of 640 by 270, without help and panel.
 /// Above the haze, which is grey as clouds are.
@@ -25,11 +27,24 @@ const SAVE: [usize; 2] = [504, 92];
 /// On the slider's rail, whose right end is full cover, once a line below the text box says what was saved.
 const COVERAGE: [usize; 2] = [430, 216];
 
-/// Flies over flat ground, with textures that are baked in no time; in the picture that it returns are clouds.
+/// Flies over flat ground, with textures that are baked in no time.
+const QUICK: [&str; 11] = [
+    "--size",
+    "640x270",
+    "--bare",
+    "--scene",
+    "ground_noon",
+    "--quality",
+    "low",
+    "--set",
+    "textures.volume_size=32",
+    "--set",
+    "textures.map_size=128",
+];
+
+/// In the picture that it returns are clouds.
 fn fly(more: &[&str]) -> (Screen, Picture) {
-    let quick = ["--size", "640x270", "--bare", "--scene", "ground_noon", "--quality", "low"];
-    let small = ["--set", "textures.volume_size=32", "--set", "textures.map_size=128"];
-    let mut screen = Screen::show("fly_camera", "bevy_cumulus", &[&quick[..], &small, more].concat());
+    let mut screen = Screen::show("fly_camera", "bevy_cumulus", &[&QUICK[..], more].concat());
     // The pointer rests where it touches nothing.
     screen.act(&["mousemove", "100", "250"]);
     let clouds = screen.wait_for("clouds", |now| (0.05..0.9).contains(&now.grey(SKY)));
@@ -69,32 +84,33 @@ fn keys_change_the_sky() {
     screen.wait_for("P to bring another preset", |now| now.differs(&before, SKY) > 8.0);
 }
 
-/// Waits until this part stays as it is: an animation has ended.
+/// Waits until this part stays as it is: an animation has ended. For longer than a slow frame takes.
 fn still(screen: &mut Screen, part: Part) {
     let (mut last, mut times) = (screen.picture(), 0);
     screen.wait_for(&format!("{part:?} to stay as it is"), |now| {
-        sleep(Duration::from_millis(200));
+        sleep(Duration::from_millis(300));
         times = if now.differs(&last, part) == 0.0 { times + 1 } else { 0 };
         last = now.clone();
-        times == 3
+        times == 6
     });
 }
 
 /// Folds a group of the panel, or unfolds it.
-fn fold(screen: &mut Screen, title: [usize; 2]) {
+fn fold(screen: &mut Screen, [x, y]: [usize; 2]) {
+    // Titles move while another group folds, and change when pointed at.
+    screen.act(&["mousemove", &x.to_string(), &y.to_string()]);
+    still(screen, PANEL);
+    let triangle = [250, y - 7, 264, y + 7];
     let before = screen.picture();
     let mut clicked = None::<Instant>;
     wait("a group to fold", PATIENCE, || {
         screen.check();
-        if clicked.is_none_or(|last| last.elapsed() > Duration::from_secs(10)) {
-            screen.click(title);
+        if clicked.is_none_or(|last| last.elapsed() > Duration::from_secs(20)) {
+            screen.click([x, y]);
             clicked = Some(Instant::now());
         }
-        // More than the scroll bar.
-        (screen.picture().differs(&before, PANEL) > 1.0).then_some(())
+        (screen.picture().differs(&before, triangle) > 1.0).then_some(())
     });
-    // The clock's numbers run; an animation ends.
-    sleep(Duration::from_millis(700));
 }
 
 #[test]
@@ -108,6 +124,7 @@ fn keys_change_quality_and_clock_as_the_panel_shows() {
     // Folded, each group's title is 21 pixels below the one before; between the second and the third is one more row.
     let [preset, modelling, sampling, clock] = [0, 1, 4, 5].map(|row| [275, 50 + 21 * row]);
     [preset, modelling, sampling].into_iter().for_each(|group| fold(&mut screen, group));
+    still(&mut screen, PANEL);
     for key in ["2", "3", "4", "1"] {
         screen.press(key, PANEL);
         still(&mut screen, PANEL);
@@ -207,4 +224,70 @@ fn minimal_shows_a_sky() {
     let mut screen = Screen::show("minimal", ".", &[]);
     let above = [0, 0, SCREEN[0], 200];
     screen.wait_for("a sky with clouds", |now| now.brightness(above) > 20.0 && (0.02..0.95).contains(&now.grey(above)));
+}
+
+#[test]
+fn a_window_manager_enlarges_hides_and_closes_it() {
+    if in_the_other_run() {
+        return;
+    }
+    let mut screen = Screen::show_managed("fly_camera", "bevy_cumulus", &QUICK);
+    screen.wait_for("clouds", |now| (0.05..0.9).contains(&now.grey(SKY)));
+    // The desktop is all grey; a window that reaches here shows blue sky.
+    let beyond = [660, 30, SCREEN[0] - 10, 150];
+    let large = |now: &Picture| now.grey(beyond) < 0.9;
+    let small = |now: &Picture| now.grey(beyond) > 0.99 && now.grey(SKY) < 0.9;
+    screen.wait_for("the desktop", small);
+    screen.act(&["key", "f"]);
+    screen.wait_for("F to fill the screen", large);
+    screen.act(&["key", "f"]);
+    screen.wait_for("F to leave it", small);
+    screen.ask(&["-r", ":ACTIVE:", "-b", "add,maximized_vert,maximized_horz"]);
+    screen.wait_for("the window to be maximised", large);
+    screen.ask(&["-r", ":ACTIVE:", "-b", "remove,maximized_vert,maximized_horz"]);
+    screen.wait_for("the window to be as it was", small);
+    let window = screen.window.clone();
+    screen.act(&["windowminimize", &window]);
+    screen.wait_for("the window to go", |now| now.grey(SKY) > 0.99);
+    screen.ask(&["-i", "-a", &window]);
+    screen.wait_for("the window to come back", small);
+    screen.ask(&["-i", "-c", &window]);
+    assert!(screen.end().success(), "closing the window is no failure");
+}
+
+#[test]
+fn without_a_display_it_says_so() {
+    for (display, says) in [("", "there is no display"), (":nonsense", "DISPLAY=:nonsense"), (":999", "DISPLAY=:999")] {
+        let output = Command::new(binary("fly_camera")).env("DISPLAY", display).output().expect("it starts");
+        let said = String::from_utf8_lossy(&output.stderr);
+        assert_eq!(output.status.code(), Some(1), "{display:?}: {said}");
+        assert!(said.starts_with("error: ") && said.contains(says) && said.lines().count() == 1, "{display:?}: {said}");
+    }
+}
+
+#[test]
+fn the_settings_show_in_another_inspector() {
+    if in_the_other_run() {
+        return;
+    }
+    let mut screen = Screen::show("resource_inspector", "bevy_cumulus", &[]);
+    // Its first window, with the model, is as dark as the sky is bright. Its third row is the coverage.
+    let (window, sky, coverage) = ([20, 50, 280, 290], [320, 10, 900, 200], [132, 100]);
+    let start = screen.wait_for("a window under a sky with clouds", |now| {
+        now.brightness(window) < 60.0 && now.brightness(sky) > 60.0 && (0.02..0.8).contains(&now.grey(sky))
+    });
+    let few = start.grey(sky);
+    let [x, y] = coverage.map(|v| v.to_string());
+    screen.act(&["mousemove", &x, &y, "sleep", "2", "mousedown", "1", "sleep", "2"]);
+    // A tenth for each pixel, and not past the range's end, which would be an error in the log.
+    let mut moved = 0;
+    wait("more coverage to bring more cloud", PATIENCE, || {
+        screen.check();
+        if moved < 8 {
+            screen.act(&["mousemove_relative", "1", "0", "sleep", "2"]);
+            moved += 1;
+        }
+        (screen.picture().grey(sky) > few + 0.15).then_some(())
+    });
+    screen.act(&["mouseup", "1"]);
 }

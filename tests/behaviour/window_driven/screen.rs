@@ -4,7 +4,7 @@ use std::{
     fs::{self, File},
     io::{BufRead, BufReader},
     path::PathBuf,
-    process::{Child, Command, Stdio},
+    process::{Child, Command, ExitStatus, Stdio},
     sync::atomic::{AtomicU32, Ordering},
     thread::sleep,
     time::{Duration, Instant},
@@ -15,7 +15,7 @@ use crate::headless;
 pub const PATIENCE: Duration = Duration::from_secs(120);
 pub const SCREEN: [usize; 2] = [960, 540];
 
-fn binary(name: &str) -> PathBuf {
+pub fn binary(name: &str) -> PathBuf {
     let path = headless::binary().with_file_name(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     assert!(path.is_file(), "{} is missing: cargo build --features inspector --examples makes it", path.display());
     path
@@ -33,9 +33,11 @@ pub fn wait<T>(what: &str, patience: Duration, mut look: impl FnMut() -> Option<
     }
 }
 
-/// An X server without a screen, and the one program that it shows. Both end with it.
+/// An X server without a screen, the one program that it shows, and a window manager where one is asked for. All end
+/// with it.
 pub struct Screen {
     server: Child,
+    manager: Option<Child>,
     program: Child,
     display: String,
     pub folder: PathBuf,
@@ -50,7 +52,7 @@ impl Drop for Screen {
             let _ = fs::copy(self.folder.join("Xvfb_screen0"), self.folder.join("last.xwd"));
             eprintln!("what it showed last and what it said: last.xwd and program.log in {}", self.folder.display());
         }
-        for process in [&mut self.program, &mut self.server] {
+        for process in self.manager.iter_mut().chain([&mut self.program, &mut self.server]) {
             let _ = process.kill();
             let _ = process.wait();
         }
@@ -98,10 +100,35 @@ fn serve(name: &str) -> (Child, String, PathBuf) {
     (server, format!(":{}", number.trim()), folder)
 }
 
+/// A window manager on this display.
+fn manage(display: &str) -> Child {
+    let started = Command::new("blackbox").env("DISPLAY", display).stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    let manager =
+        started.unwrap_or_else(|error| panic!("blackbox does not start ({error}): install it; scripts/test does"));
+    // It says in the root window that it is there.
+    wait("the window manager", PATIENCE, || {
+        let asked = Command::new("wmctrl").arg("-m").env("DISPLAY", display).output();
+        let asked =
+            asked.unwrap_or_else(|error| panic!("wmctrl does not start ({error}): install it; scripts/test does"));
+        asked.status.success().then_some(())
+    });
+    manager
+}
+
 impl Screen {
     /// Starts the program, and waits for its window to have the keyboard.
     pub fn show(name: &str, title: &str, arguments: &[&str]) -> Self {
+        Self::begin(name, title, arguments, false)
+    }
+
+    /// As [`show`](Self::show), on a desktop with a window manager.
+    pub fn show_managed(name: &str, title: &str, arguments: &[&str]) -> Self {
+        Self::begin(name, title, arguments, true)
+    }
+
+    fn begin(name: &str, title: &str, arguments: &[&str], managed: bool) -> Self {
         let (mut server, display, folder) = serve(name);
+        let manager = managed.then(|| manage(&display));
         let log = File::create(folder.join("program.log")).expect("the folder can be written");
         let program = Command::new(binary(name))
             .args(arguments)
@@ -119,7 +146,7 @@ impl Screen {
             let _ = server.kill();
             panic!("{name} does not start: {error}")
         });
-        let mut screen = Self { server, program, display, folder, window: String::new() };
+        let mut screen = Self { server, manager, program, display, folder, window: String::new() };
         screen.window = wait("a window", PATIENCE, || {
             screen.check();
             let found = screen.tool(&["search", "--onlyvisible", "--name", title])?;
@@ -142,11 +169,29 @@ impl Screen {
         assert!(self.tool(arguments).is_some(), "xdotool {arguments:?} failed");
     }
 
-    /// The program runs, and has said nothing that a user should not see.
-    pub fn check(&mut self) {
+    /// Asks the window manager, as its own buttons do.
+    pub fn ask(&self, arguments: &[&str]) {
+        let asked = Command::new("wmctrl").args(arguments).env("DISPLAY", &self.display).status();
+        assert!(asked.is_ok_and(|status| status.success()), "wmctrl {arguments:?} failed");
+    }
+
+    /// How the program ended, once it has.
+    pub fn end(&mut self) -> ExitStatus {
+        let status = wait("the program to end", PATIENCE, || self.program.try_wait().expect("a child can be asked"));
+        self.check_log();
+        status
+    }
+
+    fn check_log(&self) -> String {
         let log = fs::read_to_string(self.folder.join("program.log")).expect("the program has a log");
         let bad = ["panicked", "ERROR", "Validation", "error:"].into_iter().find(|word| log.contains(word));
         assert!(bad.is_none(), "the program said {bad:?}: {log}");
+        log
+    }
+
+    /// The program runs, and has said nothing that a user should not see.
+    pub fn check(&mut self) {
+        let log = self.check_log();
         let ended = self.program.try_wait().expect("a child can be asked");
         assert!(ended.is_none(), "the program ended with {ended:?}: {log}");
     }

@@ -1,0 +1,193 @@
+//! Drives the `headless` example: many pictures in one process, so that textures are baked once.
+
+use std::{
+    fs::{self, File},
+    io::{BufRead as _, BufReader},
+    path::{Path, PathBuf},
+    process::{Command, Stdio},
+};
+
+use anyhow::{Context as _, Result, anyhow, bail, ensure};
+use serde_json::Value;
+
+use crate::{picture::Picture, progress::Progress};
+
+/// Passes whose time is the clouds' cost. Writing `CloudBuffer` is not one: only measuring asks for it.
+const PASSES: [&str; 4] = ["cloud_sky", "cloud_march", "cloud_accumulate", "cloud_composite"];
+
+/// Where the renderer is, and where its files go.
+pub struct Engine {
+    pub headless: PathBuf,
+    pub out: PathBuf,
+    /// The scenes' fields of view are divided by this.
+    pub zoom: f64,
+}
+
+/// One picture to be made.
+#[derive(Clone, Debug)]
+pub struct Job {
+    /// Name of its files, without ending.
+    pub name: String,
+    /// Options of `headless`.
+    pub options: String,
+    pub frames: u32,
+    /// Whether the picture is wanted, or only what it took.
+    pub picture: bool,
+}
+
+/// GPU time of a job (ms a frame).
+#[derive(Clone, Debug, Default)]
+pub struct Cost {
+    /// Each pass of `PASSES`: median of the frames, or the least where [`is_software`]; empty where the device has no
+    /// timestamps.
+    pub passes: Vec<(&'static str, f64)>,
+    pub adapter: String,
+}
+
+impl Cost {
+    /// Of all passes.
+    pub fn total(&self) -> Option<f64> {
+        (!self.passes.is_empty()).then(|| self.passes.iter().map(|(_, ms)| ms).sum())
+    }
+
+    /// Of the march alone.
+    pub fn march(&self) -> Option<f64> {
+        self.passes.iter().find(|(name, _)| *name == "cloud_march").map(|(_, ms)| *ms)
+    }
+}
+
+impl Engine {
+    /// Every setting that these options amount to, without rendering.
+    pub fn effective(&self, options: &str) -> Result<Value> {
+        let output = Command::new(&self.headless)
+            .arg("--effective")
+            .args(options.split_whitespace())
+            .output()
+            .with_context(|| format!("cannot start {}", self.headless.display()))?;
+        ensure!(output.status.success(), "headless {options}: {}", String::from_utf8_lossy(&output.stderr).trim());
+        serde_json::from_slice(&output.stdout).context("headless --effective")
+    }
+
+    /// Options for the middle of a scene's view, as large as the zoom says; none without zoom.
+    pub fn view(&self, scene: &str) -> Result<String> {
+        if self.zoom == 1.0 {
+            return Ok(String::new());
+        }
+        let camera = &self.effective(&format!("--scene {scene}"))?["camera"];
+        let number = |value: &Value| value.as_f64().with_context(|| format!("headless --effective: camera {camera}"));
+        let [x, y, z] = [0, 1, 2].map(|i| number(&camera["position"][i]));
+        let (yaw, pitch, fov) = (number(&camera["yaw"])?, number(&camera["pitch"])?, number(&camera["fov"])?);
+        // So much smaller that the middle pixels keep their shape: a picture plane is flat.
+        let fov = 2.0 * ((fov.to_radians() / 2.0).tan() / self.zoom).atan().to_degrees();
+        Ok(format!("--camera {},{},{},{yaw},{pitch},{fov}", x?, y?, z?))
+    }
+
+    /// Frames after which a picture with these options is finished: its window is full.
+    pub fn frames(&self, options: &str) -> Result<u32> {
+        let quality = &self.effective(options)?["quality"];
+        let window = quality["window"].as_u64().unwrap_or(8) as u32;
+        // A few at least, for the median of their times.
+        Ok(if quality["temporal"] == "Off" { 4 } else { window.max(4) })
+    }
+
+    /// The folder of a scene's files.
+    pub fn folder(&self, scene: &str) -> PathBuf {
+        self.out.join(scene)
+    }
+
+    /// Renders jobs that share scene, size and textures, in this order.
+    pub fn render(&self, scene: &str, size: &str, jobs: &[Job], progress: &Progress) -> Result<()> {
+        let folder = self.folder(scene);
+        fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        let mut lines = String::new();
+        for Job { name, options, frames, picture } in jobs {
+            lines += &format!("{options} --frames {frames} --timings {name}.json");
+            lines += &if *picture { format!(" --out {name}.png --cloud {name}.exr\n") } else { "\n".to_owned() };
+        }
+        let batch = folder.join("batch.txt");
+        fs::write(&batch, lines).with_context(|| format!("cannot write {}", batch.display()))?;
+        let log_path = folder.join("headless.log");
+        let log = File::create(&log_path).with_context(|| format!("cannot write {}", log_path.display()))?;
+        let mut child = Command::new(fs::canonicalize(&self.headless)?)
+            .current_dir(&folder)
+            .args(["--scene", scene, "--size", size, "--batch", "batch.txt"])
+            .args(self.view(scene)?.split_whitespace())
+            .stdin(Stdio::null())
+            .stdout(Stdio::piped())
+            .stderr(log)
+            .spawn()
+            .with_context(|| format!("cannot start {}", self.headless.display()))?;
+        let stdout = child.stdout.take().ok_or_else(|| anyhow!("headless has no stdout"))?;
+        let mut done = jobs.iter();
+        // One line for each job that is done.
+        for line in BufReader::new(stdout).lines() {
+            line.context("headless")?;
+            if let Some(job) = done.next() {
+                progress.done(&format!("{scene}: {}", job.name));
+            }
+        }
+        if !child.wait().context("headless")?.success() {
+            let log = fs::read_to_string(&log_path).unwrap_or_default();
+            let tail: Vec<&str> = log.lines().rev().take(5).collect();
+            bail!("headless failed in {}: {}", batch.display(), tail.into_iter().rev().collect::<Vec<_>>().join(" / "));
+        }
+        Ok(())
+    }
+
+    /// The picture that a job made.
+    pub fn picture(&self, scene: &str, job: &str) -> Result<Picture> {
+        Picture::read(&self.folder(scene).join(job))
+    }
+
+    /// What a job took.
+    pub fn cost(&self, scene: &str, job: &str) -> Result<Cost> {
+        read_cost(&self.folder(scene).join(job).with_extension("json"))
+    }
+}
+
+fn read_cost(path: &Path) -> Result<Cost> {
+    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+    let all: Value = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
+    let adapter = all["adapter"].as_str().unwrap_or("unknown").to_owned();
+    let which = if is_software(&adapter) { "min" } else { "median" };
+    let time = |name: &'static str| Some((name, all["passes"][name][which].as_f64()?));
+    let passes: Vec<_> = PASSES.into_iter().filter_map(time).collect();
+    Ok(Cost {
+        // One missing makes the sum meaningless.
+        passes: if passes.len() == PASSES.len() { passes } else { Vec::new() },
+        adapter,
+    })
+}
+
+/// Whether a driver runs on the processor. It then shares it with whatever else runs, which only ever adds time: the
+/// quickest frame is nearest to the truth.
+pub fn is_software(adapter: &str) -> bool {
+    let name = adapter.to_lowercase();
+    ["llvmpipe", "lavapipe", "swiftshader"].iter().any(|known| name.contains(known))
+}
+
+/// The middle of some numbers.
+pub fn median(mut values: Vec<f64>) -> Option<f64> {
+    values.sort_by(f64::total_cmp);
+    let middle = values.len() / 2;
+    let upper = *values.get(middle)?;
+    Some(if values.len() % 2 == 1 { upper } else { (values[middle - 1] + upper) / 2.0 })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn software_drivers_are_known() {
+        assert!(is_software("llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)"));
+        assert!(!is_software("NVIDIA H100 (Vulkan)"));
+    }
+
+    #[test]
+    fn median_of_odd_even_and_none() {
+        assert_eq!(median(vec![3.0, 1.0, 2.0]), Some(2.0));
+        assert_eq!(median(vec![4.0, 1.0, 2.0, 3.0]), Some(2.5));
+        assert_eq!(median(Vec::new()), None);
+    }
+}

@@ -1,0 +1,231 @@
+//! Errors and costs of presets and of single approximations, against the path tracer and against our own converged
+//! march.
+
+mod report;
+mod rows;
+
+use std::fs;
+
+use anyhow::{Context as _, Result, bail};
+use clap::Args;
+use serde_json::{Value, json};
+
+use crate::{
+    Common,
+    engine::{Cost, Engine, Job, is_software},
+    machine::Machine,
+    metrics::{Errors, Truth},
+    progress::Progress,
+    sheet,
+};
+use rows::{CONVERGED, Group, HIGH, Row};
+
+const SCENES: [&str; 5] = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills"];
+const SMALL_SIZE: &str = "128x72";
+/// Samples of a reference, both halves together.
+const SAMPLES: u32 = 128;
+const FULL_SAMPLES: u32 = 4096;
+/// Frames of a job that only measures High's cost again, and rows between two of them: machines speed up and slow down.
+const HIGH_AGAIN_FRAMES: u32 = 4;
+const HIGH_AGAIN_EVERY: usize = 3;
+
+#[derive(Args)]
+pub struct Options {
+    #[command(flatten)]
+    common: Common,
+    /// Only these scenes
+    #[arg(long, value_delimiter = ',', value_name = "A,B")]
+    scenes: Vec<String>,
+    /// Only rows with one of these in their name, such as octaves,window
+    #[arg(long, value_delimiter = ',', value_name = "A,B")]
+    only: Vec<String>,
+    /// Print the names of the rows
+    #[arg(long)]
+    list: bool,
+}
+
+/// What was found for one row in one scene.
+struct Found {
+    /// Against the reference, and against the converged march.
+    to_truth: Errors,
+    to_converged: Errors,
+    cost: Cost,
+    /// Cost over High's at about the same time.
+    ratio: Option<f64>,
+}
+
+struct SceneResult {
+    scene: String,
+    /// Share of the picture that is cloud.
+    cover: f64,
+    /// FLIP between the reference's halves.
+    noise: f64,
+    /// One for each row.
+    found: Vec<Found>,
+}
+
+/// All that a report is written from.
+struct Results {
+    size: String,
+    zoom: f64,
+    samples: u32,
+    /// What stands for the reference, where it is not the path tracer.
+    stand_in: Option<String>,
+    rows: Vec<Row>,
+    scenes: Vec<SceneResult>,
+    machine: Machine,
+    seconds: u64,
+}
+
+pub fn run(options: &Options) -> Result<()> {
+    if options.list {
+        rows::all().iter().for_each(|row| println!("{:16} {}", row.name, row.label));
+        return Ok(());
+    }
+    let common = &options.common;
+    let engine = common.engine("fidelity")?;
+    let recipe = common.recipe(SAMPLES, FULL_SAMPLES)?;
+    let size = common.size(SMALL_SIZE);
+    let rows = rows::chosen(&options.only);
+    let scenes: Vec<String> =
+        if options.scenes.is_empty() { SCENES.map(str::to_owned).to_vec() } else { options.scenes.clone() };
+    let jobs = jobs(&engine, &rows)?;
+    let progress = Progress::begin(scenes.len() * (jobs.len() + 2));
+    let mut results = Vec::new();
+    for scene in &scenes {
+        let truth = recipe.make(&engine, scene, &size, "", &progress)?;
+        engine.render(scene, &size, &jobs, &progress)?;
+        results.push(judge(&engine, scene, &rows, &jobs, &truth)?);
+        if !common.keep {
+            remove_pictures(&engine, scene)?;
+        }
+    }
+    let adapter = results.first().and_then(|r| r.found.first()).map(|f| f.cost.adapter.clone()).unwrap_or_default();
+    let whole = options.scenes.is_empty() && options.only.is_empty() && !recipe.is_stand_in();
+    let results = Results {
+        size,
+        zoom: engine.zoom,
+        samples: recipe.samples,
+        stand_in: recipe.is_stand_in().then(|| recipe.quality.clone()),
+        rows,
+        scenes: results,
+        machine: Machine::this(&adapter),
+        seconds: progress.seconds(),
+    };
+    drop(progress);
+    let json_path = engine.out.join("fidelity.json");
+    fs::write(&json_path, serde_json::to_string_pretty(&results.to_json())?)
+        .with_context(|| format!("cannot write {}", json_path.display()))?;
+    let path = common.report(&engine, "FIDELITY.md", whole);
+    fs::write(&path, report::write(&results)).with_context(|| format!("cannot write {}", path.display()))?;
+    println!("{}\n{}\n{}", path.display(), json_path.display(), engine.out.join("SCENE.png").display());
+    Ok(())
+}
+
+fn again(index: usize) -> String {
+    format!("high_again_{index}")
+}
+
+/// The rows' jobs, with High's cost measured again between them: first, last, around each preset and every few rows.
+fn jobs(engine: &Engine, rows: &[Row]) -> Result<Vec<Job>> {
+    let high = |index| Job {
+        name: again(index),
+        options: "--quality high".to_owned(),
+        frames: HIGH_AGAIN_FRAMES,
+        picture: false,
+    };
+    let mut jobs = vec![high(0)];
+    let mut count = 1;
+    for (i, row) in rows.iter().enumerate() {
+        let frames = engine.frames(&row.options)?;
+        jobs.push(Job { name: row.name.to_owned(), options: row.options.clone(), frames, picture: true });
+        if row.group == Group::Preset || (i + 1) % HIGH_AGAIN_EVERY == 0 || i + 1 == rows.len() {
+            jobs.push(high(count));
+            count += 1;
+        }
+    }
+    Ok(jobs)
+}
+
+/// Cost of a job over High's: the mean of the measurements before and after it, or on a software driver, where other work
+/// only ever adds time, the least of all in the scene.
+fn cost_ratio(engine: &Engine, scene: &str, jobs: &[Job], name: &str) -> Result<Option<f64>> {
+    let Some(at) = jobs.iter().position(|job| job.name == name) else { bail!("there is no job {name}") };
+    let own = engine.cost(scene, name)?;
+    let is_high = |job: &&Job| !job.picture;
+    let near: Vec<&Job> = if is_software(&own.adapter) {
+        jobs.iter().filter(|job| is_high(job) || job.name == HIGH).collect()
+    } else {
+        let around = [jobs[..at].iter().rev().find(is_high), jobs[at..].iter().find(is_high)];
+        around.into_iter().flatten().collect()
+    };
+    let costs: Vec<Option<f64>> =
+        near.iter().map(|job| Ok(engine.cost(scene, &job.name)?.total())).collect::<Result<_>>()?;
+    let Some(costs) = costs.into_iter().collect::<Option<Vec<f64>>>() else { return Ok(None) };
+    let high = if is_software(&own.adapter) {
+        costs.iter().copied().reduce(f64::min)
+    } else {
+        Some(costs.iter().sum::<f64>() / costs.len() as f64)
+    };
+    Ok(own.total().zip(high).map(|(own, high)| own / high))
+}
+
+fn judge(engine: &Engine, scene: &str, rows: &[Row], jobs: &[Job], truth: &Truth) -> Result<SceneResult> {
+    let converged = Truth::exact(engine.picture(scene, CONVERGED)?)?;
+    let mut found = Vec::new();
+    let mut sheet_rows = Vec::new();
+    for row in rows {
+        let picture = engine.picture(scene, row.name)?;
+        let (to_truth, map) = truth.judge(&picture).with_context(|| format!("{scene}: {}", row.name))?;
+        let (to_converged, _) = converged.judge(&picture).with_context(|| format!("{scene}: {}", row.name))?;
+        let cost = engine.cost(scene, row.name)?;
+        let ratio = cost_ratio(engine, scene, jobs, row.name)?;
+        found.push(Found { to_truth, to_converged, cost, ratio });
+        if row.name == HIGH {
+            sheet_rows.insert(0, vec![truth.picture().shown.clone(), picture.shown.clone(), map.magma]);
+        } else if matches!(row.group, Group::Preset | Group::Converged) {
+            sheet_rows.push(vec![truth.picture().shown.clone(), picture.shown.clone(), map.magma]);
+        }
+    }
+    sheet::write(&engine.out.join(scene).with_extension("png"), &sheet_rows)?;
+    Ok(SceneResult { scene: scene.to_owned(), cover: truth.cover(), noise: truth.noise()?, found })
+}
+
+fn remove_pictures(engine: &Engine, scene: &str) -> Result<()> {
+    let folder = engine.folder(scene);
+    fs::remove_dir_all(&folder).with_context(|| format!("cannot remove {}", folder.display()))
+}
+
+impl Results {
+    /// Errors of a row in all scenes.
+    fn errors(&self, row: usize, of: fn(&Found) -> Errors) -> Vec<Errors> {
+        self.scenes.iter().filter_map(|scene| scene.found.get(row).map(of)).collect()
+    }
+
+    /// Geometric mean over the scenes of a row's cost ratio.
+    fn ratio(&self, row: usize) -> Option<f64> {
+        let logs: Option<Vec<f64>> = self.scenes.iter().map(|scene| Some(scene.found.get(row)?.ratio?.ln())).collect();
+        let logs = logs.filter(|logs| !logs.is_empty())?;
+        Some((logs.iter().sum::<f64>() / logs.len() as f64).exp())
+    }
+
+    fn row(&self, name: &str) -> Option<usize> {
+        self.rows.iter().position(|row| row.name == name)
+    }
+
+    fn to_json(&self) -> Value {
+        let found = |scene: &SceneResult| -> Value {
+            let rows = self.rows.iter().zip(&scene.found).map(|(row, found)| {
+                let passes: Value =
+                    found.cost.passes.iter().map(|(name, ms)| ((*name).to_owned(), json!(ms))).collect();
+                let all = json!({ "to_reference": found.to_truth.to_json(), "passes_ms": passes,
+                    "to_converged": found.to_converged.to_json(), "cost_ratio": found.ratio });
+                (row.name.to_owned(), all)
+            });
+            json!({ "cover": scene.cover, "noise": scene.noise, "rows": rows.collect::<Value>() })
+        };
+        let scenes: Value = self.scenes.iter().map(|scene| (scene.scene.clone(), found(scene))).collect();
+        json!({ "size": self.size, "zoom": self.zoom, "samples": self.samples, "stand_in": self.stand_in, "date": self.machine.date,
+            "adapter": self.machine.adapter, "commit": self.machine.commit, "scenes": scenes })
+    }
+}

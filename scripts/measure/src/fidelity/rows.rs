@@ -1,0 +1,137 @@
+//! What is measured: each row is a set of options of `headless`.
+
+/// Where a row stands in the report.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Group {
+    /// A quality preset as it is.
+    Preset,
+    /// The march with nothing left to save: what every `Alone` differs from in one thing.
+    Converged,
+    /// One approximation of the converged march.
+    Alone,
+    /// One change of the default preset.
+    FromHigh,
+}
+
+#[derive(Clone, Debug)]
+pub struct Row {
+    pub group: Group,
+    /// Name of its files; `--only` looks for parts of it.
+    pub name: &'static str,
+    /// What it is, in the tables.
+    pub label: &'static str,
+    pub options: String,
+}
+
+/// Name of the row that the others' cost is measured by.
+pub const HIGH: &str = "high";
+pub const CONVERGED: &str = "converged";
+
+/// Steps so short, and so many towards the sun, that shorter and more change nothing that matters: against steps of 8 m,
+/// growth .001 and 64 light steps, FLIP is .011, relMSE 6e-5, luminance within .2 % (ground_noon, 128×72, 16 frames).
+const CONVERGED_SETTINGS: &[&str] = &[
+    "quality.step=30",
+    "quality.step_growth=0.003",
+    "quality.max_steps=8192",
+    "quality.light_steps=24",
+    "quality.light_step=12",
+    "quality.light_growth=1.2",
+    "quality.transmittance_stop=0",
+    "quality.density_skip=0",
+];
+
+const PRESETS: [(&str, &str); 4] = [("low", "Low"), ("medium", "Medium"), (HIGH, "High (default)"), ("ultra", "Ultra")];
+
+type Change = (&'static str, &'static str, &'static [&'static str]);
+
+/// The approximations, each alone.
+const ALONE: [Change; 25] = [
+    ("octaves_1", "1 octave: single scattering", &["lighting.octaves=1"]),
+    ("octaves_2", "2 octaves", &["lighting.octaves=2"]),
+    ("octaves_4", "4 octaves", &["lighting.octaves=4"]),
+    ("diffusion_off", "no diffusion term", &["lighting.diffusion=0"]),
+    ("phase_cut_10", "phase cut at 10", &["lighting.phase_limit=10"]),
+    ("phase_cut_300", "phase cut at 300", &["lighting.phase_limit=300"]),
+    ("phase_cut_none", "phase not cut", &["lighting.phase_limit=100000"]),
+    ("ambient_off", "no ambient light", &["lighting.ambient_strength=0"]),
+    ("light_4", "4 light steps (Low's)", &LIGHT_LOW),
+    ("light_6", "6 light steps (High's)", &LIGHT_HIGH),
+    ("light_12", "12 light steps (Ultra's)", &LIGHT_ULTRA),
+    ("step_140", "step 140 m (Low's)", &["quality.step=140", "quality.step_growth=0.014"]),
+    ("step_90", "step 90 m (High's)", &["quality.step=90", "quality.step_growth=0.008"]),
+    ("step_40", "step 40 m (Ultra's)", &["quality.step=40", "quality.step_growth=0.004"]),
+    ("half", "half resolution", &["quality.resolution=half"]),
+    ("quarter", "quarter resolution", &["quality.resolution=quarter"]),
+    ("window_1", "1 frame", &["quality.temporal=off"]),
+    ("window_8", "8 frames", &["quality.window=8"]),
+    ("stop_high", "stop at transmittance .01 (High's)", &["quality.transmittance_stop=0.01"]),
+    ("stop_thesis", "stop at transmittance .075 (thesis)", &["quality.transmittance_stop=0.075"]),
+    ("skip_high", "skip density below .002 (High's)", &["quality.density_skip=0.002"]),
+    ("skip_thesis", "skip density below .01 (thesis)", &["quality.density_skip=0.01"]),
+    ("lod_1", "noise one mip level coarser", &["quality.lod_bias=1"]),
+    ("distance_90", "90 km (High's)", &["quality.max_distance=90000"]),
+    ("distance_50", "50 km (Low's)", &["quality.max_distance=50000"]),
+];
+const LIGHT_LOW: [&str; 3] = ["quality.light_steps=4", "quality.light_step=60", "quality.light_growth=2.2"];
+const LIGHT_HIGH: [&str; 3] = ["quality.light_steps=6", "quality.light_step=45", "quality.light_growth=1.7"];
+const LIGHT_ULTRA: [&str; 3] = ["quality.light_steps=12", "quality.light_step=25", "quality.light_growth=1.35"];
+
+/// Changes of the default preset: there a window does more than where steps are short.
+const FROM_HIGH: [Change; 4] = [
+    ("high_window_1", "High, 1 frame", &["quality.temporal=off"]),
+    ("high_window_16", "High, 16 frames", &["quality.window=16"]),
+    ("high_full", "High, full resolution", &["quality.resolution=full"]),
+    ("high_quarter", "High, quarter resolution", &["quality.resolution=quarter"]),
+];
+
+/// All rows, in the order of the report.
+pub fn all() -> Vec<Row> {
+    let change =
+        |group, base: &str, (name, label, settings): Change| Row { group, name, label, options: with(base, settings) };
+    let converged = with("--quality ultra", CONVERGED_SETTINGS);
+    let presets = PRESETS.into_iter().map(|(name, label)| Row {
+        group: Group::Preset,
+        name,
+        label,
+        options: format!("--quality {name}"),
+    });
+    presets
+        .chain([Row { group: Group::Converged, name: CONVERGED, label: "Converged march", options: converged.clone() }])
+        .chain(ALONE.into_iter().map(|row| change(Group::Alone, &converged, row)))
+        .chain(FROM_HIGH.into_iter().map(|row| change(Group::FromHigh, "--quality high", row)))
+        .collect()
+}
+
+/// The rows asked for, with those that others are measured by.
+pub fn chosen(only: &[String]) -> Vec<Row> {
+    let wanted = |row: &Row| {
+        only.is_empty()
+            || row.name == HIGH
+            || row.group == Group::Converged
+            || only.iter().any(|part| row.name.contains(part.as_str()))
+    };
+    all().into_iter().filter(wanted).collect()
+}
+
+fn with(base: &str, settings: &[&str]) -> String {
+    settings.iter().fold(base.to_owned(), |options, setting| format!("{options} --set {setting}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_file_names_of_their_own() {
+        let rows = all();
+        let names: std::collections::BTreeSet<_> = rows.iter().map(|row| row.name).collect();
+        assert_eq!(names.len(), rows.len());
+        assert!(names.iter().all(|name| name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_')));
+    }
+
+    #[test]
+    fn a_part_still_has_what_it_is_measured_by() {
+        let names: Vec<_> = chosen(&["octaves".to_owned()]).iter().map(|row| row.name).collect();
+        assert_eq!(names, [HIGH, CONVERGED, "octaves_1", "octaves_2", "octaves_4"]);
+    }
+}

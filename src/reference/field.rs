@@ -1,0 +1,290 @@
+//! The built-in model, "what is at p?". Twin of `model/model.wesl`, function for function.
+//!
+//! Offsets and rates are those that the shader is given (`model/uniform.rs`); positions are f64. What is read from
+//! textures comes through [`ModelTextures`]. A [`ModelShader`](crate::ModelShader) has no twin.
+
+use bevy::math::{DVec2, DVec3, DVec4, Vec4Swizzles};
+
+use super::{
+    planet::{Planet, altitude, map_position},
+    profile,
+};
+use crate::{
+    model::{ModelUniform, TangentFrame, TexelSizes},
+    settings::CloudModel,
+};
+
+/// Shares of the four octaves of a noise volume, as in the shader.
+pub(crate) const OCTAVES: [f32; 4] = [0.5, 0.25, 0.15, 0.1];
+
+/// What the model reads. `at` is in repeats of the texture, `level` the mip level; results are 0..=1.
+pub trait ModelTextures {
+    /// Sides of billow volume, wisp volume, coverage map and type map (texels).
+    fn sides(&self) -> [u32; 4];
+    /// Billowy noise: the volume's four octaves summed with their shares.
+    fn billow(&self, at: DVec3, level: f64) -> f64;
+    /// Wispy noise, likewise.
+    fn wisp(&self, at: DVec3, level: f64) -> f64;
+    /// Coverage map.
+    fn coverage(&self, at: DVec2, level: f64) -> f64;
+    /// Bound of the coverage map.
+    fn coverage_bound(&self, at: DVec2, level: f64) -> f64;
+    /// Type map.
+    fn type_map(&self, at: DVec2, level: f64) -> f64;
+    /// Vertical profile of a type at a height, both 0..=1.
+    fn gradient(&self, cloud_type: f64, height: f64) -> f64;
+}
+
+/// What is at a point: `Medium` of `medium.wesl`.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct Medium {
+    /// Density, 0 to [`CloudModel::density`]; 0 means empty air.
+    pub density: f64,
+    /// Extinction coefficient σt·ρ (1/m).
+    pub extinction: f64,
+    /// Single-scattering albedo σs/σt, linear RGB.
+    pub albedo: DVec3,
+    /// Dimensional profile: 0 at the cloud's envelope, 1 deep inside.
+    pub profile: f64,
+    /// Height within the layer: 0 base, 1 top.
+    pub height: f64,
+}
+
+impl Medium {
+    /// Clear air.
+    pub const EMPTY: Self = Self { density: 0.0, extinction: 0.0, albedo: DVec3::ONE, profile: 0.0, height: 0.0 };
+}
+
+/// The model at one time, in the tangent frame below one point: what a camera at that point is shown.
+///
+/// Points are in that frame (origin on the surface straight below, y up, m), as in the shader; [`local`](Self::local)
+/// takes them there. `lod` is log2 of the width (m) that a reading is filtered over.
+pub struct LocalModel<'a, T> {
+    model: ModelUniform,
+    frame: TangentFrame,
+    eye: DVec3,
+    textures: &'a T,
+}
+
+impl<'a, T: ModelTextures> LocalModel<'a, T> {
+    /// The model at cloud time `seconds` as seen from `eye` (world space, m). `None` where up is undefined: at the
+    /// planet's centre, or where a number is not finite.
+    pub fn new(model: &CloudModel, seconds: f64, eye: DVec3, planet: Planet, textures: &'a T) -> Option<Self> {
+        let frame = TangentFrame::below(eye + model.world_offset, planet.centre, planet.radius)?;
+        let [billow, wisp, coverage, type_map] = textures.sides();
+        let sizes = TexelSizes { billow, wisp, coverage, type_map };
+        Some(Self { model: ModelUniform::new(model, seconds, &frame, sizes), frame, eye, textures })
+    }
+
+    /// A point of the world (m) in the frame.
+    pub fn local(&self, p: DVec3) -> DVec3 {
+        self.local_direction(p - self.eye) + DVec3::Y * self.frame.altitude
+    }
+
+    /// A direction of the world in the frame.
+    pub fn local_direction(&self, direction: DVec3) -> DVec3 {
+        self.frame.local_from_world * direction
+    }
+
+    /// Radius of the planet (m).
+    pub fn radius(&self) -> f64 {
+        self.frame.radius
+    }
+
+    /// Altitude of the point that the frame is below (m).
+    pub fn eye_altitude(&self) -> f64 {
+        self.frame.altitude
+    }
+
+    /// Lowest and highest altitude that may hold cloud (m).
+    pub fn bounds(&self) -> [f64; 2] {
+        [self.model.bottom.into(), self.model.top.into()]
+    }
+
+    /// The finest detail there is to see (m): a texel of the finest noise, and no more than 1/64 of the layer.
+    pub fn finest(&self) -> f64 {
+        let texels = self.model.texels;
+        let detail = if self.model.detail_strength > 0.0 { texels.y } else { texels.x };
+        f64::from(texels.x.min(detail).min(texels.z).exp2()).min(self.thickness() / 64.0)
+    }
+
+    /// Upper bound of the density within `reach` metres of `p`; its extinction is that times σt.
+    pub fn density_bound(&self, p: DVec3, reach: f64) -> f64 {
+        let model = &self.model;
+        let height = self.layer_height(p);
+        let away = reach / self.thickness();
+        if height + away < 0.0 || height - away > 1.0 {
+            return 0.0;
+        }
+        let m = self.leaning_position(p, height);
+        // The lean moves the map by up to skew metres per metre of height; a level's maximum covers half a texel.
+        let wide = (reach * (1.0 + f64::from(model.skew))).log2() + 1.0;
+        let level = |texel: f32| (wide - f64::from(texel)).ceil().max(0.0);
+        let mut own = self.textures.coverage_bound(self.own_map(m), level(model.texels.w));
+        let mut group = self.textures.coverage_bound(self.group_map(m), level(model.map_texels.x));
+        if m.length() + wide.exp2() > FADE[0] {
+            own = own.max(self.textures.coverage(self.own_map(m), MEAN_LEVEL));
+            group = group.max(self.textures.coverage(self.group_map(m), MEAN_LEVEL));
+        }
+        self.combine_coverage(own, group) * f64::from(model.density)
+    }
+
+    /// As [`density_bound`](Self::density_bound), of the extinction (1/m).
+    pub fn extinction_bound(&self, p: DVec3, reach: f64) -> f64 {
+        self.density_bound(p, reach) * f64::from(self.model.extinction)
+    }
+
+    /// The medium at `p`, filtered over 2^`lod` metres.
+    pub fn sample_medium(&self, p: DVec3, lod: f64) -> Medium {
+        let model = &self.model;
+        let h = altitude(p, self.frame.radius);
+        let height = (h - f64::from(model.bottom)) / self.thickness();
+        let m = self.leaning_position(p, height);
+        let profile = self.dimensional_profile(m, height, lod);
+        if profile <= 0.0 {
+            return Medium::EMPTY;
+        }
+        let density = self.erode(profile, self.cloud_noise(m, h, height, lod)) * f64::from(model.density);
+        Medium {
+            density,
+            extinction: density * f64::from(model.extinction),
+            albedo: model.albedo.xyz().as_dvec3(),
+            profile,
+            height,
+        }
+    }
+
+    fn thickness(&self) -> f64 {
+        f64::from(self.model.top) - f64::from(self.model.bottom)
+    }
+
+    fn layer_height(&self, p: DVec3) -> f64 {
+        (altitude(p, self.frame.radius) - f64::from(self.model.bottom)) / self.thickness()
+    }
+
+    /// Map position with the lean of tops taken out (m).
+    fn leaning_position(&self, p: DVec3, height: f64) -> DVec2 {
+        map_position(p, self.frame.radius) - self.model.lean.xy().as_dvec2() * height
+    }
+
+    fn own_map(&self, m: DVec2) -> DVec2 {
+        m * f64::from(self.model.map_rate) + self.model.map_offset.xy().as_dvec2()
+    }
+
+    fn group_map(&self, m: DVec2) -> DVec2 {
+        let turned = DVec2::new(0.8 * m.x - 0.6 * m.y, 0.6 * m.x + 0.8 * m.y);
+        turned * f64::from(self.model.group_rate) + self.model.map_offset.zw().as_dvec2()
+    }
+
+    /// Coverage from the two readings of the map.
+    fn combine_coverage(&self, own: f64, group: f64) -> f64 {
+        let gathered = own * mix(1.0, smoothstep(0.0, 0.5, group), self.model.map_variation.into());
+        (gathered + f64::from(self.model.coverage)).clamp(0.0, 1.0)
+    }
+
+    fn coverage_at(&self, m: DVec2, lod: f64) -> f64 {
+        let fade = smoothstep(FADE[0], FADE[1], m.length());
+        let read = |at: DVec2, rate: f32, texel: f32| {
+            let coarsest = (-f64::from(rate).log2() - 7.0 - f64::from(texel)).max(0.0);
+            let near = self.textures.coverage(at, level(lod, texel).min(coarsest));
+            if fade > 0.0 { mix(near, self.textures.coverage(at, MEAN_LEVEL), fade) } else { near }
+        };
+        let model = &self.model;
+        let own = read(self.own_map(m), model.map_rate, model.texels.w);
+        let group = read(self.group_map(m), model.group_rate, model.map_texels.x);
+        self.combine_coverage(own, group)
+    }
+
+    /// 0 stratus to 1 cumulus.
+    fn type_at(&self, m: DVec2, lod: f64) -> f64 {
+        let model = &self.model;
+        let at = m * f64::from(model.type_rate) + model.type_offset.xy().as_dvec2();
+        let bulge = self.textures.type_map(at, level(lod, model.map_texels.y));
+        f64::from(model.cloud_type) * mix(1.0, bulge, model.type_variation.into())
+    }
+
+    /// `d = coverage · vertical profile` (Ford 3.1).
+    fn dimensional_profile(&self, m: DVec2, height: f64, lod: f64) -> f64 {
+        if height <= 0.0 || height >= 1.0 {
+            return 0.0;
+        }
+        let coverage = self.coverage_at(m, lod);
+        if coverage <= 0.0 {
+            return 0.0;
+        }
+        profile::dimensional_profile(coverage, self.textures.gradient(self.type_at(m, lod), height))
+    }
+
+    /// Wispy noise near the base gives way to billowy noise above; fine billows fade out with lod (Ford 4.2.2).
+    fn cloud_noise(&self, m: DVec2, h: f64, height: f64, lod: f64) -> f64 {
+        let model = &self.model;
+        let q = DVec3::new(m.x, h, m.y);
+        let at = |rate: f32, offset: DVec4| q * f64::from(rate) + offset.truncate();
+        let wispiness = 1.0 - smoothstep(0.0, model.wisp_height.into(), height);
+        let mut noise = 0.0;
+        if wispiness < 1.0 {
+            let billow = at(model.billow_rate, model.billow_offset.as_dvec4());
+            noise = self.textures.billow(billow, level(lod, model.texels.x));
+            let detail_lod = lod - f64::from(model.texels.y);
+            let share = f64::from(model.detail_strength) * (5.0 - detail_lod).clamp(0.0, 1.0);
+            if share > 0.0 {
+                let detail = at(model.detail_rate, model.detail_offset.as_dvec4());
+                noise = mix(noise, self.textures.billow(detail, detail_lod.max(0.0)), share);
+            }
+        }
+        if wispiness > 0.0 {
+            let wisp = at(model.wisp_rate, model.wisp_offset.as_dvec4());
+            noise = mix(noise, self.textures.wisp(wisp, level(lod, model.texels.z)), wispiness);
+        }
+        noise
+    }
+
+    fn erode(&self, profile: f64, noise: f64) -> f64 {
+        let n = 1.0 - f64::from(self.model.noise_strength) * (1.0 - noise);
+        profile::erode(profile, n, self.model.erosion())
+    }
+}
+
+/// Past every map's last mip level, which holds its mean; and where coverage fades to that (m).
+const MEAN_LEVEL: f64 = 16.0;
+const FADE: [f64; 2] = [1e6, 4e6];
+
+/// Mip level for a filter width, given log2 of a texel's size.
+fn level(lod: f64, texel: f32) -> f64 {
+    (lod - f64::from(texel)).max(0.0)
+}
+
+fn mix(a: f64, b: f64, share: f64) -> f64 {
+    a * (1.0 - share) + b * share
+}
+
+fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
+    let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
+    t * t * (3.0 - 2.0 * t)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cameras_agree_on_the_map() {
+        // A point seen from elsewhere against the point seen from itself, both as far away as this from each other and
+        // from the map's origin.
+        for (far, allowed) in [(5e3, 2e-3), (5e4, 2.0), (3e5, 400.0)] {
+            let planet = Planet::default();
+            let mut worst = 0.0_f64;
+            for k in 0..24 {
+                let angle = f64::from(k) * 0.2618;
+                let from = DVec3::new(far, 2000.0, 0.0);
+                let p = from + far * DVec3::new(angle.cos(), 0.0, angle.sin());
+                let frame = |eye| TangentFrame::below(eye, planet.centre, planet.radius).unwrap();
+                let seen = frame(from);
+                let local = seen.local_from_world * (p - from) + DVec3::Y * seen.altitude;
+                worst = worst.max((seen.map + map_position(local, planet.radius) - frame(p).map).length());
+            }
+            println!("{far} m: {worst} m aside");
+            assert!(worst < allowed, "{far} m: {worst} m aside");
+        }
+    }
+}

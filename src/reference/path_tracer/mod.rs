@@ -1,0 +1,69 @@
+//! The path tracer's stage: the march's and the window's place is taken by one pass that adds a sample to each pixel.
+
+use bevy::{
+    asset::{embedded_asset, load_embedded_asset},
+    prelude::*,
+    render::render_resource::{binding_types::*, *},
+    shader::load_shader_library,
+};
+
+use crate::render::{FrameUniform, depth_layout};
+
+pub(crate) fn add_shaders(app: &mut App) {
+    load_shader_library!(app, "rng.wesl");
+    load_shader_library!(app, "scatter.wesl");
+    load_shader_library!(app, "tracking.wesl");
+    load_shader_library!(app, "paths.wesl");
+    embedded_asset!(app, "path_trace.wesl");
+    embedded_asset!(app, "noise.wesl");
+}
+
+/// Layouts, one without and one with multisampling, and shaders.
+pub(crate) struct PathTracer {
+    pub trace: [BindGroupLayoutDescriptor; 2],
+    pub noise: BindGroupLayoutDescriptor,
+    pub trace_shader: Handle<Shader>,
+    pub noise_shader: Handle<Shader>,
+}
+
+impl FromWorld for PathTracer {
+    fn from_world(world: &mut World) -> Self {
+        let unfiltered = || texture_2d(TextureSampleType::Float { filterable: false });
+        let write = |format| texture_storage_2d(format, StorageTextureAccess::WriteOnly);
+        let trace = |multisampled| {
+            BindGroupLayoutDescriptor::new(
+                "cloud_path_trace",
+                &BindGroupLayoutEntries::sequential(
+                    ShaderStages::COMPUTE,
+                    (
+                        uniform_buffer::<FrameUniform>(false),
+                        unfiltered(),
+                        unfiltered(),
+                        depth_layout(multisampled),
+                        write(TextureFormat::Rgba32Float),
+                        write(TextureFormat::Rg32Float),
+                        uniform_buffer::<Mat4>(false),
+                        write(TextureFormat::Rgba32Float),
+                    ),
+                ),
+            )
+        };
+        Self {
+            trace: [trace(false), trace(true)],
+            noise: BindGroupLayoutDescriptor::new(
+                "cloud_noise",
+                &BindGroupLayoutEntries::sequential(
+                    ShaderStages::COMPUTE,
+                    (
+                        uniform_buffer::<FrameUniform>(false),
+                        unfiltered(),
+                        unfiltered(),
+                        write(TextureFormat::Rgba32Float),
+                    ),
+                ),
+            ),
+            trace_shader: load_embedded_asset!(world, "path_trace.wesl"),
+            noise_shader: load_embedded_asset!(world, "noise.wesl"),
+        }
+    }
+}
