@@ -68,7 +68,7 @@ pub mod prelude {
         settings::{
             CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
             CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
-            PhaseFunction, TemporalMode,
+            PhaseFunction, TemporalMode, UpscaleBlock,
         },
     };
 }
@@ -123,7 +123,7 @@ fn missing_capability(world: &World) -> Option<String> {
     }
     let limits = device.limits();
     for (what, has, needs) in [
-        ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 2),
+        ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 3),
         ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 1),
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 128),
         ("max_bind_groups", limits.max_bind_groups, 3),
@@ -132,9 +132,13 @@ fn missing_capability(world: &World) -> Option<String> {
             return Some(format!("{name}: {what} is {has}, and clouds need {needs}"));
         }
     }
-    for format in
-        [TextureFormat::Rgba8Unorm, TextureFormat::Rgba16Float, TextureFormat::Rgba32Float, TextureFormat::Rg32Float]
-    {
+    for format in [
+        TextureFormat::Rgba8Unorm,
+        TextureFormat::Rgba16Float,
+        TextureFormat::Rgba32Float,
+        TextureFormat::Rg32Float,
+        TextureFormat::R32Uint,
+    ] {
         if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {
             return Some(format!("{name}: {format:?} cannot be a storage texture"));
         }

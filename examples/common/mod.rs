@@ -40,6 +40,8 @@ pub struct Scene {
     pub settings: &'static [Setting],
     /// The stage that is looked at.
     pub debug: CloudDebugView,
+    /// Whether the picture is shared by two cameras: the right half looks back.
+    pub split: bool,
     /// Further settings of each picture of a strip; empty where there is one picture.
     pub strip: &'static [&'static [Setting]],
 }
@@ -57,11 +59,12 @@ const EVERYDAY: Scene = Scene {
     ev_offset: 0.0,
     settings: &[],
     debug: CloudDebugView::None,
+    split: false,
     strip: &[],
 };
 
 /// The everyday scenes. The ground, the sun and Bevy's atmosphere are in each.
-const SCENES: [Scene; 5] = [
+const SCENES: [Scene; 12] = [
     Scene {
         name: "ground_noon",
         preset: "FairWeather",
@@ -97,6 +100,37 @@ const SCENES: [Scene; 5] = [
         camera: CameraPose::new(0.0, 420.0, 0.0, 0.0, 9.0),
         sun: SunPose::new(38.0, 115.0),
         hills: true,
+        ..EVERYDAY
+    },
+    Scene { name: "inside", camera: CameraPose::new(0.0, 2100.0, 0.0, 40.0, 4.0), ..EVERYDAY },
+    Scene { name: "above", camera: CameraPose::new(0.0, 7000.0, 0.0, 0.0, -22.0), ..EVERYDAY },
+    Scene {
+        name: "between",
+        camera: CameraPose::new(0.0, 2000.0, 0.0, -60.0, 0.0),
+        sun: SunPose::new(30.0, 60.0),
+        ..EVERYDAY
+    },
+    Scene { name: "orbit", camera: CameraPose::new(0.0, 400_000.0, 0.0, 0.0, -50.0), ..EVERYDAY },
+    Scene {
+        name: "limb",
+        camera: CameraPose::new(0.0, 400_000.0, 0.0, 0.0, -19.0),
+        sun: SunPose::new(40.0, 60.0),
+        ..EVERYDAY
+    },
+    Scene {
+        name: "hills_in_cloud",
+        preset: "Overcast",
+        camera: CameraPose::new(0.0, 1700.0, 0.0, 0.0, -12.0),
+        sun: SunPose::new(38.0, 115.0),
+        hills: true,
+        settings: &[("model.bottom", "300"), ("model.top", "1100")],
+        ..EVERYDAY
+    },
+    Scene {
+        name: "split_screen",
+        hills: true,
+        camera: CameraPose::new(0.0, 420.0, 0.0, 0.0, 9.0),
+        split: true,
         ..EVERYDAY
     },
 ];

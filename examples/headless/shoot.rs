@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow, bail, ensure};
 use bevy::{
-    camera::RenderTarget,
+    camera::{RenderTarget, Viewport},
     diagnostic::DiagnosticsStore,
     log::{Level, LogPlugin},
     prelude::*,
@@ -81,6 +81,8 @@ pub fn shoot_many(plans: &[Plan], mut done: impl FnMut(&Plan, &Shot) -> Result<(
 struct Studio {
     app: App,
     camera: Entity,
+    /// The one whose half of the picture is on the right.
+    second: Option<Entity>,
     sun: Entity,
     target: Handle<Image>,
     /// Absent where only timings are wanted, so that it costs them nothing.
@@ -153,9 +155,29 @@ impl Studio {
         if let Some(noise) = &noise {
             world.entity_mut(camera).insert(CloudNoise(noise.clone()));
         }
-        let mut studio = Self { app, camera, sun, target, buffer, noise };
+        let second = plan.scene.split.then(|| Self::split(world, camera, plan));
+        let mut studio = Self { app, camera, second, sun, target, buffer, noise };
         studio.pose(plan, 0);
         Ok(studio)
+    }
+
+    /// Leaves the left half to the camera, and gives the right one to another at a quarter of the resolution.
+    fn split(world: &mut World, camera: Entity, plan: &Plan) -> Entity {
+        let left = UVec2::new((plan.size.0 / 2).max(1), plan.size.1);
+        let right = UVec2::new((plan.size.0 - left.x).max(1), plan.size.1);
+        let half = |x, physical_size| Camera {
+            order: x as isize,
+            clear_color: if x == 0 { ClearColorConfig::Default } else { ClearColorConfig::None },
+            viewport: Some(Viewport { physical_position: UVec2::new(x, 0), physical_size, ..default() }),
+            ..default()
+        };
+        let second = world.entity_mut(camera).insert(half(0, left)).clone_and_spawn();
+        let quality = CloudQuality { resolution: MarchResolution::Quarter, ..plan.settings.quality.clone() };
+        world.entity_mut(second).remove::<CloudBuffer>().insert((
+            half(plan.size.0 - right.x, right),
+            CloudView { quality: Some(quality), debug: plan.debug, ..default() },
+        ));
+        second
     }
 
     /// Puts camera, sun and clock where they are in the counted frame `k`.
@@ -164,6 +186,10 @@ impl Studio {
         let aspect = plan.size.0 as f32 / plan.size.1 as f32;
         let world = self.app.world_mut();
         world.entity_mut(self.camera).insert((pose.transform(), pose.projection(aspect)));
+        if let Some(second) = self.second {
+            let back = common::CameraPose { yaw: pose.yaw + 180.0, ..pose };
+            world.entity_mut(second).insert((back.transform(), back.projection(aspect)));
+        }
         world.entity_mut(self.sun).insert(sun);
         world.resource_mut::<CloudClock>().seconds = plan.seconds(k);
     }

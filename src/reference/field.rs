@@ -120,8 +120,12 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         // The lean moves the map by up to skew metres per metre of height; a level's maximum covers half a texel.
         let wide = (reach * (1.0 + f64::from(model.skew))).log2() + 1.0;
         let level = |texel: f32| (wide - f64::from(texel)).ceil().max(0.0);
-        let own = self.textures.coverage_bound(self.own_map(m), level(model.texels.w));
-        let group = self.textures.coverage_bound(self.group_map(m), level(model.map_texels.x));
+        let mut own = self.textures.coverage_bound(self.own_map(m), level(model.texels.w));
+        let mut group = self.textures.coverage_bound(self.group_map(m), level(model.map_texels.x));
+        if m.length() + wide.exp2() > FADE[0] {
+            own = own.max(self.textures.coverage(self.own_map(m), MEAN_LEVEL));
+            group = group.max(self.textures.coverage(self.group_map(m), MEAN_LEVEL));
+        }
         self.combine_coverage(own, group) * f64::from(model.density)
     }
 
@@ -179,8 +183,15 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
     }
 
     fn coverage_at(&self, m: DVec2, lod: f64) -> f64 {
-        let own = self.textures.coverage(self.own_map(m), level(lod, self.model.texels.w));
-        let group = self.textures.coverage(self.group_map(m), level(lod, self.model.map_texels.x));
+        let fade = smoothstep(FADE[0], FADE[1], m.length());
+        let read = |at: DVec2, rate: f32, texel: f32| {
+            let coarsest = (-f64::from(rate).log2() - 7.0 - f64::from(texel)).max(0.0);
+            let near = self.textures.coverage(at, level(lod, texel).min(coarsest));
+            if fade > 0.0 { mix(near, self.textures.coverage(at, MEAN_LEVEL), fade) } else { near }
+        };
+        let model = &self.model;
+        let own = read(self.own_map(m), model.map_rate, model.texels.w);
+        let group = read(self.group_map(m), model.group_rate, model.map_texels.x);
         self.combine_coverage(own, group)
     }
 
@@ -233,6 +244,10 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         profile::erode(profile, n, self.model.erosion())
     }
 }
+
+/// Past every map's last mip level, which holds its mean; and where coverage fades to that (m).
+const MEAN_LEVEL: f64 = 16.0;
+const FADE: [f64; 2] = [1e6, 4e6];
 
 /// Mip level for a filter width, given log2 of a texel's size.
 fn level(lod: f64, texel: f32) -> f64 {

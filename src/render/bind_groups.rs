@@ -191,9 +191,39 @@ fn view_bind_groups(
     let (air, air_offsets) = air.unwrap_or_else(|| (empty.clone(), Vec::new()));
     let frame = item.uniforms.frame.binding()?;
     let world_from_local = item.uniforms.world_from_local.binding()?;
+    let held = item.uniforms.held.binding()?;
     let history = item.history;
     let group = |label: &'static str, descriptor: &BindGroupLayoutDescriptor, entries: &[BindGroupEntry]| {
         device.create_bind_group(label, &layout(descriptor), entries)
+    };
+    // One of two ways to make a picture of the frames.
+    let picture_group = || match history.marched_after() {
+        Some(marched_after) => {
+            let entries = BindGroupEntries::sequential((
+                frame.clone(),
+                &history.frames_view,
+                history.sum_before(),
+                depth,
+                &history.marched_view,
+                held.clone(),
+                history.marched_before(),
+                history.sum_after(),
+                marched_after,
+                &history.distances,
+            ));
+            (ids.blend, group("cloud_blend", &pipelines.blend[ms], &entries))
+        }
+        None => {
+            let entries = BindGroupEntries::sequential((
+                frame.clone(),
+                &history.frames_view,
+                history.sum_before(),
+                history.sum_after(),
+                &history.marched_view,
+                held.clone(),
+            ));
+            (ids.accumulate, group("cloud_accumulate", &pipelines.accumulate, &entries))
+        }
     };
     let light = match ids.traced {
         None => Light::March {
@@ -208,24 +238,15 @@ fn view_bind_groups(
                         textures.blue_noise.as_ref()?,
                         depth,
                         history.newest(),
-                        &history.distances,
+                        history.marched_distances(),
                         world_from_local.clone(),
+                        history.marched_before(),
+                        history.marched_now(),
+                        held.clone(),
                     )),
                 ),
             ),
-            accumulate: (
-                ids.accumulate,
-                group(
-                    "cloud_accumulate",
-                    &pipelines.accumulate,
-                    &BindGroupEntries::sequential((
-                        frame.clone(),
-                        &history.frames_view,
-                        history.sum_before(),
-                        history.sum_after(),
-                    )),
-                ),
-            ),
+            accumulate: picture_group(),
         },
         Some([trace, noise]) => {
             let [before, after] = history.moments()?;

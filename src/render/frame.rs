@@ -7,7 +7,7 @@ use crate::{
     model::TangentFrame,
     reference::phase::Phase,
     settings::{CloudDebugView, CloudLighting, CloudQuality, Integration},
-    textures::n_rooks::n_rooks,
+    textures::n_rooks::{MAX_WINDOW, n_rooks},
 };
 
 /// The brightest directional light.
@@ -77,10 +77,7 @@ impl FrameUniform {
         let FrameInput { space, sun, quality, lighting, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();
         let size = marched_size(*viewport, quality);
-        let rooks = n_rooks(window.window as usize);
-        let slot = window.index % window.window;
-        let rook = rooks[slot as usize % rooks.len()];
-        let stratum = 1.0 / window.window as f32;
+        let reach = reach(quality, lighting, space);
         // Settings are validated before they get here, so the fallback is never seen.
         let phase = Phase::from_settings(lighting).unwrap_or(Phase::Isotropic);
         let (kind, phase_params) = phase.shader_parameters();
@@ -106,11 +103,11 @@ impl FrameUniform {
             limits: Vec4::new(
                 quality.transmittance_stop,
                 quality.density_skip,
-                quality.max_distance,
+                reach,
                 // smoothstep is undefined where both edges meet.
-                quality.max_distance * lighting.fade_start.min(0.999),
+                reach * lighting.fade_start.min(0.999),
             ),
-            offsets: Vec4::new(rook[0], rook[1], slot as f32 * stratum, stratum),
+            offsets: offsets(quality, *window),
             camera: Vec4::new(
                 space.altitude as f32,
                 space.radius as f32,
@@ -141,6 +138,40 @@ impl FrameUniform {
     }
 }
 
+/// How far is marched (m). From the ground `max_distance`; higher up it grows, so that from space all clouds up to the
+/// planet's rim are nearer than where the fade begins.
+fn reach(quality: &CloudQuality, lighting: &CloudLighting, space: &TangentFrame) -> f32 {
+    /// Where it begins to grow and where all is seen (m).
+    const GROWS: [f32; 2] = [10_000.0, 60_000.0];
+    /// From the horizon to the far side of the highest clouds there are (m).
+    const PAST_HORIZON: f64 = 400_000.0;
+    let altitude = space.altitude.max(0.0);
+    let rim = (altitude * (2.0 * space.radius + altitude)).sqrt() + PAST_HORIZON;
+    let all = rim as f32 / lighting.fade_start.clamp(0.1, 0.999);
+    let share = ((altitude as f32 - GROWS[0]) / (GROWS[1] - GROWS[0])).clamp(0.0, 1.0);
+    quality.max_distance.lerp(all.max(quality.max_distance), share * share)
+}
+
+/// Where this frame samples pixel and step.
+fn offsets(quality: &CloudQuality, window: FrameInWindow) -> Vec4 {
+    if quality.carries_picture() {
+        // There is no window whose frames could share a step out: van der Corput's sequence fills it (Högfeldt 6.1).
+        let sample = window.index / quality.block_side().pow(2);
+        let [x, y] = n_rooks(MAX_WINDOW)[sample as usize % MAX_WINDOW];
+        return Vec4::new(x, y, van_der_corput(sample), 1.0);
+    }
+    let rooks = n_rooks(window.window as usize);
+    let slot = window.index % window.window;
+    let [x, y] = rooks[slot as usize % rooks.len()];
+    let stratum = 1.0 / window.window as f32;
+    Vec4::new(x, y, slot as f32 * stratum, stratum)
+}
+
+/// The binary digits of `i` mirrored at the point: 0, ½, ¼, ¾, ... No more than 16 of them, so that f32 holds it.
+fn van_der_corput(i: u32) -> f32 {
+    (i.reverse_bits() >> 16) as f32 / 65_536.0
+}
+
 /// Strength, fall with optical depth and asymmetry of the diffuse light, and factors on optical depth and asymmetry of
 /// the first octave. Single scattering alone (one octave), or the octaves alone (no diffusion), are the thesis's.
 fn diffusion(lighting: &CloudLighting, phase: &Phase) -> [f32; 5] {
@@ -155,4 +186,43 @@ fn diffusion(lighting: &CloudLighting, phase: &Phase) -> [f32; 5] {
         _ => 0.0,
     };
     [lighting.diffusion, fall, lighting.diffusion_asymmetry, 1.0 - 0.6 * peak, 1.0 - 0.02 * peak]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn van_der_corput_fills_the_step_evenly() {
+        assert_eq!([0, 1, 2, 3, 4].map(van_der_corput), [0.0, 0.5, 0.25, 0.75, 0.125]);
+        // Any run of eight hits each eighth once.
+        for start in 0..40 {
+            let mut eighths: Vec<u32> = (start..start + 8).map(|i| (van_der_corput(i) * 8.0) as u32).collect();
+            eighths.sort_unstable();
+            assert_eq!(eighths, [0, 1, 2, 3, 4, 5, 6, 7], "from {start}");
+        }
+    }
+
+    #[test]
+    fn from_space_no_cloud_before_the_rim_fades() {
+        let lighting = CloudLighting::default();
+        let quality = CloudQuality::default();
+        let at = |altitude: f64| {
+            let r = 6_360_000.0;
+            let space = TangentFrame::below(glam::DVec3::Y * (r + altitude), glam::DVec3::ZERO, r).unwrap();
+            reach(&quality, &lighting, &space)
+        };
+        for low in [-5.0, 2.0, 9_000.0] {
+            assert_eq!(at(low), quality.max_distance);
+        }
+        for high in [60e3, 400e3, 36e6_f64] {
+            // Tops of 12 km on the far side of the horizon.
+            let r = 6_360_000.0;
+            let rim = (high * (2.0 * r + high)).sqrt() + (12e3 * (2.0 * r + 12e3)).sqrt();
+            assert!(f64::from(at(high) * lighting.fade_start) > rim, "from {high} m");
+        }
+        // Without a jump on the way.
+        let steps: Vec<f32> = (0..1000).map(|k| at(f64::from(k) * 100.0)).collect();
+        assert!(steps.windows(2).all(|w| w[1] >= w[0] && w[1] < 1.02 * w[0] + 1.0));
+    }
 }

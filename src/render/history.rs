@@ -1,12 +1,14 @@
 //! What a view remembers: the frames of its window, their sum, and when to start over.
 
+use std::collections::VecDeque;
+
 use bevy::{
     math::Vec4Swizzles,
     prelude::*,
     render::{render_resource::*, renderer::RenderDevice},
 };
 
-use super::frame::Sun;
+use super::reproject::{HeldUniform, Pose, Sparse};
 
 /// Where the coming frame stands in the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,20 +57,12 @@ pub(crate) struct HistoryKey {
     pub msaa: u32,
 }
 
-/// What may move a little within a window.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Pose {
-    pub clip_from_view: Mat4,
-    pub position: Vec3,
-    pub rotation: Quat,
-    pub sun: Sun,
-    pub exposure: f32,
-    /// Cloud time (s).
-    pub seconds: f64,
-    /// Metres of wind a window may hold before it smears: two marched texels at the shell.
-    pub drift_limit: f32,
-    /// Wind speed (m/s).
-    pub wind: f32,
+/// What only a picture that is carried on needs.
+struct Carried {
+    /// How far its texels were marched, as `pack_marched` in `held.wesl` puts it: by frame, in turn.
+    marched: [TextureView; 2],
+    /// Distances of the frame as marched; those of the picture are resolved with it.
+    scratch: TextureView,
 }
 
 /// A view's textures and place in its window. Lives on the view's render entity.
@@ -76,15 +70,21 @@ pub(crate) struct Pose {
 pub(crate) struct CloudHistory {
     key: HistoryKey,
     pose: Pose,
+    /// Poses of the frames held before this one, the latest first.
+    held: VecDeque<Pose>,
     pub frame: FrameInWindow,
     frames: Texture,
     /// All layers, to be read.
     pub frames_view: TextureView,
     layer_views: Vec<TextureView>,
+    /// The same of what `pack_marched` in `held.wesl` makes.
+    pub marched_view: TextureView,
+    marched_layers: Vec<TextureView>,
     sums: [TextureView; 2],
+    carried: Option<Carried>,
     /// Of the path tracer's samples.
     moments: Option<[TextureView; 2]>,
-    /// Mean cloud distance and marched limit (m).
+    /// Mean cloud distance and marched limit (m) of the newest frame.
     pub distances: TextureView,
 }
 
@@ -105,26 +105,26 @@ impl CloudHistory {
             })
         };
         let frames = texture("cloud_frames", TextureFormat::Rgba16Float, frame.layers());
+        let marched = texture("cloud_marched", TextureFormat::R32Uint, frame.layers());
         let whole = |t: Texture| t.create_view(&TextureViewDescriptor::default());
-        let layer = |i| {
-            frames.create_view(&TextureViewDescriptor {
-                label: Some("cloud_frame"),
-                dimension: Some(TextureViewDimension::D2),
-                base_array_layer: i,
-                array_layer_count: Some(1),
-                ..default()
-            })
-        };
+        let (frames_view, layer_views) = layers(&frames);
+        let (marched_view, marched_layers) = layers(&marched);
         Self {
-            frames_view: frames
-                .create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() }),
-            layer_views: (0..frame.layers()).map(layer).collect(),
+            frames_view,
+            layer_views,
+            marched_view,
+            marched_layers,
+            held: VecDeque::with_capacity(frame.layers() as usize),
             sums: [0, 1].map(|_| whole(texture("cloud_sum", TextureFormat::Rgba32Float, 1))),
             moments: key
                 .quality
                 .is_path_traced()
                 .then(|| [0, 1].map(|_| whole(texture("cloud_path_moments", TextureFormat::Rgba32Float, 1)))),
             distances: whole(texture("cloud_distances", TextureFormat::Rg32Float, 1)),
+            carried: key.quality.carries_picture().then(|| Carried {
+                marched: [0, 1].map(|_| whole(texture("cloud_picture_marched", TextureFormat::R32Uint, 1))),
+                scratch: whole(texture("cloud_scratch", TextureFormat::Rg32Float, 1)),
+            }),
             frames,
             key,
             pose,
@@ -135,24 +135,47 @@ impl CloudHistory {
     /// Goes on to the next frame, or starts over where something changed or the last frame was not drawn.
     pub fn advance(&mut self, device: &RenderDevice, key: HistoryKey, pose: Pose, drawn: bool) {
         let path_traced = key.quality.is_path_traced();
-        if key.size != self.key.size || key.window != self.key.window || path_traced != self.moments.is_some() {
+        let same_textures =
+            path_traced == self.moments.is_some() && key.quality.carries_picture() == self.carried.is_some();
+        if key.size != self.key.size || key.window != self.key.window || !same_textures {
             *self = Self::new(device, key, pose);
             return;
         }
+        let exposed = pose.exposure / self.frame.exposure;
         // Path-traced frames add up without end: nothing may move at all.
-        let span = if path_traced { f32::MAX } else { key.window as f32 };
-        let keep = drawn && key == self.key && stands_still(&self.pose, &pose, span, self.frame.exposure);
+        let goes_on = if path_traced { pose.stands_still(&self.pose, f32::MAX) } else { !pose.is_cut(&self.pose) };
+        let keep = drawn && key == self.key && (0.25..4.0).contains(&exposed) && goes_on;
         self.frame = if keep {
+            self.held.push_front(self.pose);
+            self.held.truncate(key.window as usize);
             FrameInWindow {
                 index: self.frame.index.wrapping_add(1),
                 held_before: self.frame.held_after(),
                 ..self.frame
             }
         } else {
+            self.held.clear();
             FrameInWindow { index: 0, held_before: 0, exposure: pose.exposure, ..self.frame }
         };
         self.key = key;
         self.pose = pose;
+    }
+
+    /// Where the frames held before this one saw what this one sees.
+    pub fn held_uniform(&self) -> HeldUniform {
+        let still = self.held.front().is_some_and(|before| self.pose.stands_still(before, self.key.window as f32));
+        HeldUniform::new(&self.pose, self.held.iter(), still, self.sparse(), self.key.quality.samples_kept())
+    }
+
+    /// Which texels this frame marches.
+    fn sparse(&self) -> Sparse {
+        Sparse::new(self.key.quality.block_side(), self.frame.index)
+    }
+
+    /// Rays along each side that cover what this frame marches.
+    pub fn rays(&self) -> UVec2 {
+        let side = self.key.quality.block_side();
+        (self.key.size + side - 1) / side
     }
 
     /// Marched size.
@@ -166,6 +189,26 @@ impl CloudHistory {
     /// Where this frame is marched to.
     pub fn newest(&self) -> &TextureView {
         &self.layer_views[self.frame.layer() as usize]
+    }
+    /// How far this frame's texels are marched.
+    pub fn marched_now(&self) -> &TextureView {
+        &self.marched_layers[self.frame.layer() as usize]
+    }
+    /// How far the last picture's were; another texture than this frame's even where there was none.
+    pub fn marched_before(&self) -> &TextureView {
+        if let Some(carried) = &self.carried {
+            return &carried.marched[(self.frame.index & 1) as usize];
+        }
+        let layers = self.frame.layers();
+        &self.marched_layers[((self.frame.layer() + layers - 1) % layers) as usize]
+    }
+    /// How far the texels of the picture with this frame are, where one is carried on.
+    pub fn marched_after(&self) -> Option<&TextureView> {
+        Some(&self.carried.as_ref()?.marched[(self.frame.index & 1 ^ 1) as usize])
+    }
+    /// Where the march writes distances.
+    pub fn marched_distances(&self) -> &TextureView {
+        self.carried.as_ref().map_or(&self.distances, |carried| &carried.scratch)
     }
     /// The sum before this frame.
     pub fn sum_before(&self) -> &TextureView {
@@ -186,37 +229,23 @@ impl CloudHistory {
     }
 }
 
-/// Whether the window may go on: the thesis's window is right only while nothing moves. The camera must not at all;
-/// clouds and sun may move less than shows within a window of so many frames.
-fn stands_still(before: &Pose, now: &Pose, frames: f32, stored_exposure: f32) -> bool {
-    let camera = before.clip_from_view == now.clip_from_view
-        && before.position.distance(now.position) < 1e-3
-        && before.rotation.abs_diff_eq(now.rotation, 1e-5);
-    let drift = now.wind * (now.seconds - before.seconds).abs() as f32 * frames;
-    // Sine of the angle: acos has no precision where the two are alike.
-    let turned = before.sun.direction.cross(now.sun.direction).length() * frames;
-    let brightness = before.sun.illuminance.length().max(1e-6);
-    let dimmed = (before.sun.illuminance - now.sun.illuminance).length() / brightness * frames;
-    let exposed = now.exposure / stored_exposure;
-    camera && drift <= now.drift_limit && turned <= 0.01 && dimmed < 0.05 && (0.25..4.0).contains(&exposed)
+/// A view of all layers, and one of each.
+fn layers(texture: &Texture) -> (TextureView, Vec<TextureView>) {
+    let all = TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() };
+    let one = |i| {
+        texture.create_view(&TextureViewDescriptor {
+            dimension: Some(TextureViewDimension::D2),
+            base_array_layer: i,
+            array_layer_count: Some(1),
+            ..default()
+        })
+    };
+    (texture.create_view(&all), (0..texture.depth_or_array_layers()).map(one).collect())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn pose() -> Pose {
-        Pose {
-            clip_from_view: Mat4::IDENTITY,
-            position: Vec3::ZERO,
-            rotation: Quat::IDENTITY,
-            sun: Sun { direction: Vec3::Y, illuminance: Vec3::ONE, angular_size: 0.0 },
-            exposure: 1.0,
-            seconds: 0.0,
-            drift_limit: 10.0,
-            wind: 10.0,
-        }
-    }
 
     #[test]
     fn layers_never_meet() {
@@ -230,31 +259,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn motion_starts_over_and_a_breeze_does_not() {
-        let still = pose();
-        assert!(stands_still(&still, &Pose { seconds: 1.0 / 60.0, ..still }, 8.0, 1.0));
-        for moved in [
-            Pose { position: Vec3::X, ..still },
-            Pose { rotation: Quat::from_rotation_y(0.01), ..still },
-            Pose { seconds: 1.0, ..still },
-            Pose { sun: Sun { direction: Vec3::X, ..still.sun }, ..still },
-            Pose { sun: Sun { illuminance: Vec3::splat(2.0), ..still.sun }, ..still },
-            Pose { exposure: 8.0, ..still },
-            Pose { clip_from_view: Mat4::from_scale(Vec3::splat(2.0)), ..still },
-        ] {
-            assert!(!stands_still(&still, &moved, 8.0, 1.0), "{moved:?}");
-        }
-    }
-
-    #[test]
-    fn without_end_nothing_may_move() {
-        let still = pose();
-        assert!(stands_still(&still, &still, f32::MAX, 1.0));
-        assert!(!stands_still(&still, &Pose { seconds: 1e-6, ..still }, f32::MAX, 1.0));
-        let sun = Sun { direction: Vec3::new(1e-5, 1.0, 0.0), ..still.sun };
-        assert!(!stands_still(&still, &Pose { sun, ..still }, f32::MAX, 1.0));
     }
 }

@@ -6,6 +6,7 @@ mod frame;
 pub(crate) mod history;
 mod passes;
 mod pipelines;
+mod reproject;
 mod status;
 mod view;
 
@@ -39,10 +40,16 @@ impl Plugin for CloudRenderPlugin {
         load_shader_library!(app, "march/lighting.wesl");
         load_shader_library!(app, "march/aerial.wesl");
         load_shader_library!(app, "march/debug.wesl");
+        load_shader_library!(app, "march/past.wesl");
+        load_shader_library!(app, "march/limit.wesl");
+        load_shader_library!(app, "accumulate/held.wesl");
+        load_shader_library!(app, "accumulate/around.wesl");
+        load_shader_library!(app, "accumulate/reproject.wesl");
         load_shader_library!(app, "composite/upsample.wesl");
         load_shader_library!(app, "sky/sky.wesl");
         embedded_asset!(app, "march/march.wesl");
         embedded_asset!(app, "accumulate/accumulate.wesl");
+        embedded_asset!(app, "accumulate/blend.wesl");
         embedded_asset!(app, "composite/composite.wesl");
         embedded_asset!(app, "composite/publish.wesl");
         crate::reference::path_tracer::add_shaders(app);

@@ -77,7 +77,7 @@ pub(crate) fn cloud_light(
         label,
         cache.get_compute_pipeline(*id),
         [(&groups.air, &groups.air_offsets), (&groups.model, &[]), (own, &[])],
-        workgroups(history.size()),
+        workgroups(history.rays()),
     );
 }
 

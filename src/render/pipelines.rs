@@ -14,7 +14,7 @@ use bevy::{
     render::render_resource::{binding_types::*, *},
 };
 
-use super::frame::FrameUniform;
+use super::{frame::FrameUniform, reproject::HeldUniform};
 use crate::{model::ModelBindings, reference::path_tracer::PathTracer, settings::DebugShader};
 
 /// What a stage's pipeline depends on.
@@ -48,6 +48,7 @@ pub(crate) struct Pipelines {
     /// The march of finished clouds, shown while a debug view's own is not compiled.
     pub plain_march: CachedComputePipelineId,
     pub accumulate: CachedComputePipelineId,
+    pub blend: CachedComputePipelineId,
     pub composite: CachedRenderPipelineId,
     pub publish: CachedComputePipelineId,
     /// The path tracer and its noise, where they were asked for.
@@ -62,10 +63,11 @@ pub(crate) struct CloudPipelines {
     pub sky: BindGroupLayoutDescriptor,
     pub march: [BindGroupLayoutDescriptor; 2],
     pub accumulate: BindGroupLayoutDescriptor,
+    pub blend: [BindGroupLayoutDescriptor; 2],
     pub composite: [BindGroupLayoutDescriptor; 2],
     pub publish: [BindGroupLayoutDescriptor; 2],
     pub path_tracer: PathTracer,
-    shaders: [Handle<Shader>; 5],
+    shaders: [Handle<Shader>; 6],
     fullscreen: FullscreenShader,
     made: HashMap<Variant, Pipelines>,
 }
@@ -98,6 +100,29 @@ impl FromWorld for CloudPipelines {
                         write(TextureFormat::Rgba16Float),
                         write(TextureFormat::Rg32Float),
                         uniform_buffer::<Mat4>(false),
+                        texture_2d(TextureSampleType::Uint),
+                        write(TextureFormat::R32Uint),
+                        uniform_buffer::<HeldUniform>(false),
+                    ),
+                ),
+            )
+        };
+        let blend = |multisampled| {
+            BindGroupLayoutDescriptor::new(
+                "cloud_blend",
+                &BindGroupLayoutEntries::sequential(
+                    compute,
+                    (
+                        frame(),
+                        texture_2d_array(unfiltered),
+                        texture_2d(unfiltered),
+                        depth_layout(multisampled),
+                        texture_2d_array(TextureSampleType::Uint),
+                        uniform_buffer::<HeldUniform>(false),
+                        texture_2d(TextureSampleType::Uint),
+                        write(TextureFormat::Rgba32Float),
+                        write(TextureFormat::R32Uint),
+                        write(TextureFormat::Rg32Float),
                     ),
                 ),
             )
@@ -156,9 +181,17 @@ impl FromWorld for CloudPipelines {
                 "cloud_accumulate",
                 &BindGroupLayoutEntries::sequential(
                     compute,
-                    (frame(), texture_2d_array(unfiltered), texture_2d(unfiltered), write(TextureFormat::Rgba32Float)),
+                    (
+                        frame(),
+                        texture_2d_array(unfiltered),
+                        texture_2d(unfiltered),
+                        write(TextureFormat::Rgba32Float),
+                        texture_2d_array(TextureSampleType::Uint),
+                        uniform_buffer::<HeldUniform>(false),
+                    ),
                 ),
             ),
+            blend: [blend(false), blend(true)],
             composite: [composite(false), composite(true)],
             publish: [publish(false), publish(true)],
             shaders: [
@@ -167,6 +200,7 @@ impl FromWorld for CloudPipelines {
                 load_embedded_asset!(world, "accumulate/accumulate.wesl"),
                 load_embedded_asset!(world, "composite/composite.wesl"),
                 load_embedded_asset!(world, "composite/publish.wesl"),
+                load_embedded_asset!(world, "accumulate/blend.wesl"),
             ],
             path_tracer: PathTracer::from_world(world),
             fullscreen: world.resource::<FullscreenShader>().clone(),
@@ -249,6 +283,7 @@ impl CloudPipelines {
             march,
             plain_march: march,
             accumulate: compute("cloud_accumulate", 2, [&self.empty, &self.empty, &self.accumulate]),
+            blend: compute("cloud_blend", 5, [&self.empty, &self.empty, &self.blend[ms]]),
             composite,
             publish: compute("cloud_publish", 4, [&self.empty, &self.empty, &self.publish[ms]]),
             traced: None,
@@ -266,7 +301,7 @@ impl Pipelines {
 
     /// Whether a picture can be drawn: every stage is compiled, be the march that of finished clouds.
     pub fn drawable(self, cache: &PipelineCache) -> bool {
-        [self.sky, self.drawable_march(cache), self.accumulate, self.publish]
+        [self.sky, self.drawable_march(cache), self.accumulate, self.blend, self.publish]
             .iter()
             .chain(self.traced.iter().flatten())
             .all(|id| cache.get_compute_pipeline(*id).is_some())

@@ -18,7 +18,8 @@ use super::{
     CloudBuffer, CloudFrame, CloudNoise, StatusFlags,
     bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
-    history::{CloudHistory, HistoryKey, Pose},
+    history::{CloudHistory, HistoryKey},
+    reproject::{HeldUniform, Pose},
 };
 use crate::{
     model::{ModelUniform, TangentFrame, TexelSizes},
@@ -33,7 +34,7 @@ use crate::{
 #[derive(Resource, Default)]
 pub(crate) struct ExtractedClouds {
     settings: CloudSettings,
-    /// Counts changes that make held frames wrong. The clock is not one of them: drift is judged by distance.
+    /// Counts changes that make held frames wrong.
     version: u64,
 }
 
@@ -58,6 +59,7 @@ impl ExtractedCloudView {
 #[derive(Component, Default)]
 pub(crate) struct CloudUniforms {
     pub frame: UniformBuffer<FrameUniform>,
+    pub held: UniformBuffer<HeldUniform>,
     pub model: UniformBuffer<ModelUniform>,
     pub world_from_local: UniformBuffer<Mat4>,
 }
@@ -82,7 +84,9 @@ pub(crate) fn forget_lost_device(mut commands: Commands, views: Query<Entity, Wi
 }
 
 pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut<ExtractedClouds>) {
+    // Time and a shifted origin move what is seen; frames held are moved along.
     out.settings.clock.clone_from(&good.0.clock);
+    out.settings.model.world_offset = good.0.model.world_offset;
     if out.settings != good.0 {
         out.settings.clone_from(&good.0);
         out.version += 1;
@@ -205,13 +209,14 @@ pub(crate) fn prepare_views(
         let Some(space) = space else { continue };
         let (key, pose) = window_state(&item, &clouds, &textures, &space, sun);
         let mut first = None;
-        let window = match &mut item.history {
+        let history = match &mut item.history {
             Some(history) => {
                 history.advance(&device, key, pose, status.views_were_drawn());
-                history.frame
+                &**history
             }
-            None => first.insert(CloudHistory::new(&device, key, pose)).frame,
+            None => first.insert(CloudHistory::new(&device, key, pose)),
         };
+        let (window, held) = (history.frame, history.held_uniform());
         let (model, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
@@ -233,9 +238,11 @@ pub(crate) fn prepare_views(
             None => own.insert(CloudUniforms::default()),
         };
         uniforms.frame.set(frame);
+        uniforms.held.set(held);
         uniforms.model.set(model);
         uniforms.world_from_local.set(world_from_local);
         uniforms.frame.write_buffer(&device, &queue);
+        uniforms.held.write_buffer(&device, &queue);
         uniforms.model.write_buffer(&device, &queue);
         uniforms.world_from_local.write_buffer(&device, &queue);
         let mut entity = commands.entity(item.entity);
@@ -298,13 +305,16 @@ fn window_state(
     };
     let pose = Pose {
         clip_from_view: view.clip_from_view,
-        position: view.world_from_view.translation(),
+        position: view.world_from_view.translation().as_dvec3() + model.world_offset,
         rotation: view.world_from_view.rotation(),
+        world_from_local: space.local_from_world.inverse().as_quat(),
         sun,
         exposure: item.camera.exposure,
         seconds: clouds.settings.clock.seconds,
-        drift_limit: 2.0 * angle * to_shell,
-        wind: model.wind.length() + model.evolution.abs(),
+        wind: model.wind.with_y(0.0),
+        rise: model.wind.y.abs() + model.evolution.abs(),
+        to_shell,
+        texel: angle * to_shell,
     };
     (key, pose)
 }

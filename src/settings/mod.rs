@@ -19,7 +19,7 @@ pub use lighting::{CloudLighting, PhaseFunction};
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
 pub use preset::{CloudPreset, PresetError};
-pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode};
+pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
 pub use view::{CloudClock, CloudView};
 

@@ -49,9 +49,38 @@ pub enum CloudMethod {
 pub enum TemporalMode {
     /// Every frame stands alone.
     Off,
-    /// The thesis's unified TAA (4.5): the mean of the last `window` frames; restarts when the camera moves.
+    /// The thesis's unified TAA (4.5): the mean of the last `window` frames. While the camera stands still that is one
+    /// addition and one subtraction; in motion each held frame is reprojected by its own camera, which costs in
+    /// proportion to `window` but far less than a march. What no longer fits is left out. The default.
     #[default]
     SlidingWindow,
+    /// The last picture, reprojected, with `alpha` of the newest frame blended in (Högfeldt 6.1). Two frames of memory;
+    /// changes of light lag by about 1/`alpha` frames, and motion softens it.
+    Exponential,
+    /// One texel of each `block` is marched a frame; the others are taken from the last picture. Cheapest; fast
+    /// motion and changes of light show late or soft. A texel shows the mean of its last `window` samples.
+    Upscale,
+}
+
+/// Of which blocks of texels [`TemporalMode::Upscale`] marches one a frame.
+#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+pub enum UpscaleBlock {
+    /// 2×2: a quarter is marched; the default.
+    #[default]
+    Two,
+    /// 4×4: a sixteenth is marched.
+    Four,
+}
+
+impl UpscaleBlock {
+    /// Texels along one side: 2 or 4.
+    pub fn side(self) -> u32 {
+        match self {
+            Self::Two => 2,
+            Self::Four => 4,
+        }
+    }
 }
 
 /// How one step of the march is integrated.
@@ -109,7 +138,8 @@ pub struct CloudQuality {
     /// Samples whose density is below this are skipped (thesis: 0.01). Default 0.002.
     #[reflect(@0.0..=0.9_f32)]
     pub density_skip: f32,
-    /// Cut-off distance (m): nothing is marched beyond. Default 90 000.
+    /// Cut-off distance (m): nothing is marched beyond. From 10 km up it grows with altitude, so that from space (60 km)
+    /// clouds reach to the planet's rim. Default 90 000.
     #[reflect(@100.0..=2_000_000.0_f32)]
     pub max_distance: f32,
     /// Added to the mip level of all noise: above 0 is smoother and cheaper. Default 0.
@@ -122,9 +152,15 @@ pub struct CloudQuality {
     pub offsets: bool,
     /// How frames are combined. Default [`TemporalMode::SlidingWindow`].
     pub temporal: TemporalMode,
-    /// Frames in the sliding window. Memory is linear in it, time is not. Default 8.
+    /// Frames in the sliding window. Memory is linear in it; time is not while the camera stands still. Default 8.
     #[reflect(@1..=16_u32)]
     pub window: u32,
+    /// Share of the newest frame in [`TemporalMode::Exponential`] (Högfeldt 6.1): lower is smoother and lags more.
+    /// Default 0.05.
+    #[reflect(@0.005..=1.0_f32)]
+    pub alpha: f32,
+    /// What [`TemporalMode::Upscale`] marches a frame. Default [`UpscaleBlock::Two`].
+    pub block: UpscaleBlock,
     /// Random numbers of [`CloudMethod::PathTrace`]: another seed makes another, independent picture. Default 0.
     #[reflect(@0..=4_294_967_295_u32)]
     pub seed: u32,
@@ -187,6 +223,8 @@ impl CloudQuality {
             offsets: true,
             temporal: TemporalMode::SlidingWindow,
             window: 8,
+            alpha: 0.05,
+            block: UpscaleBlock::Two,
             seed: 0,
         }
     }
@@ -237,12 +275,28 @@ impl CloudQuality {
         if self.is_path_traced() { 1 } else { self.resolution.divisor() }
     }
 
-    /// Frames held: `window`, or 1 where [`TemporalMode::Off`] or paths are traced, whose sum alone is kept.
+    /// Frames held: `window` for [`TemporalMode::SlidingWindow`], else 1; 1 too where paths are traced, whose sum alone is
+    /// kept.
     pub fn held_frames(&self) -> u32 {
         match self.temporal {
             _ if self.is_path_traced() => 1,
-            TemporalMode::Off => 1,
+            TemporalMode::Off | TemporalMode::Exponential | TemporalMode::Upscale => 1,
             TemporalMode::SlidingWindow => self.window.clamp(1, 16),
         }
+    }
+
+    /// Whether one picture is carried on from frame to frame, in place of a window of frames.
+    pub(crate) fn carries_picture(&self) -> bool {
+        !self.is_path_traced() && matches!(self.temporal, TemporalMode::Exponential | TemporalMode::Upscale)
+    }
+
+    /// Texels along one side of the blocks of which one is marched a frame.
+    pub(crate) fn block_side(&self) -> u32 {
+        if self.carries_picture() && self.temporal == TemporalMode::Upscale { self.block.side() } else { 1 }
+    }
+
+    /// Samples that a texel of a carried picture is the mean of; older ones fade.
+    pub(crate) fn samples_kept(&self) -> f32 {
+        if self.temporal == TemporalMode::Exponential { 1.0 / self.alpha } else { self.window as f32 }
     }
 }

@@ -29,6 +29,10 @@ const TEXELS: usize = 16 * 9;
 const WINDOW: usize = 16;
 const LAYERS: u32 = WINDOW as u32 + 1;
 const CHANNELS: usize = 4 * TEXELS;
+/// As `pack_marched` of `held.wesl` puts it: nothing has changed for 255 frames.
+const UNCHANGED: u32 = 255 << 24;
+/// Bytes of `Held`: 16 matrices, 16 vectors and one more.
+const HELD_BYTES: u64 = 16 * (64 + 16) + 16;
 
 /// Byte offset of a member of `CloudFrame`, and the struct's size. Its members are matrices and vectors of four.
 fn place_of(member: &str) -> (usize, usize) {
@@ -74,6 +78,8 @@ fn layouts() -> [BindGroupLayoutDescriptor; 2] {
             texture_2d_array(unfiltered),
             texture_2d(unfiltered),
             texture_storage_2d(TextureFormat::Rgba32Float, StorageTextureAccess::WriteOnly),
+            texture_2d_array(TextureSampleType::Uint),
+            uniform_buffer_sized(false, None),
         ),
     );
     [BindGroupLayoutDescriptor::new("test nothing", &[]), BindGroupLayoutDescriptor::new("test accumulation", &own)]
@@ -122,21 +128,36 @@ impl Accumulation {
                 view_formats: &[],
             })
         };
-        let uniform = device.create_buffer(&BufferDescriptor {
-            label: Some("test frame"),
-            size: place_of("size").1 as u64,
-            usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-            mapped_at_creation: false,
-        });
+        let uniform = |size| {
+            device.create_buffer(&BufferDescriptor {
+                label: Some("test frame"),
+                size,
+                usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
+                mapped_at_creation: false,
+            })
+        };
+        let (uniform, held) = (uniform(place_of("size").1 as u64), uniform(HELD_BYTES));
         let frames = texture(TextureFormat::Rgba16Float, LAYERS);
         let sums = [0, 1].map(|_| texture(TextureFormat::Rgba32Float, 1));
-        let all =
-            frames.create_view(&TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() });
+        let marched = texture(TextureFormat::R32Uint, LAYERS);
+        for z in 0..LAYERS {
+            let layer = TexelCopyTextureInfo { origin: Origin3d { z, ..Origin3d::ZERO }, ..marched.as_image_copy() };
+            write(world.resource::<RenderQueue>(), layer, 4, bytemuck::cast_slice(&[UNCHANGED; TEXELS]));
+        }
+        let array = TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() };
+        let (all, marched) = (frames.create_view(&array), marched.create_view(&array));
         let views = sums.each_ref().map(|t| t.create_view(&TextureViewDescriptor::default()));
         let [empty, own] = layouts().map(|l| cache.get_bind_group_layout(&l));
         let groups = [0, 1].map(|parity| {
-            let entries = (uniform.as_entire_binding(), &all, &views[parity], &views[1 - parity]);
-            device.create_bind_group("test accumulation", &own, &BindGroupEntries::sequential(entries))
+            let entries = BindGroupEntries::sequential((
+                uniform.as_entire_binding(),
+                &all,
+                &views[parity],
+                &views[1 - parity],
+                &marched,
+                held.as_entire_binding(),
+            ));
+            device.create_bind_group("test accumulation", &own, &entries)
         });
         let empty = device.create_bind_group("test nothing", &empty, &[]);
         let places = ["size", "layers"].map(|member| place_of(member).0);

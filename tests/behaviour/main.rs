@@ -13,6 +13,7 @@ mod gpu;
 mod halves;
 mod headless;
 mod intervals;
+mod motion;
 mod occlusion;
 mod path_tracer;
 mod phases;

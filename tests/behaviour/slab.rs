@@ -129,7 +129,7 @@ fn directions(camera: &Transform) -> Vec<DVec3> {
 }
 
 fn spans(height: f64, mu: f64) -> Vec<[f64; 2]> {
-    shell_intervals(height, mu, BOTTOM, TOP, PLANET_RADIUS, 2e6)
+    shell_intervals(height, mu, BOTTOM, TOP, PLANET_RADIUS, 1e7)
 }
 
 /// Metres of slab along a ray, and how far f32 may be off: what a last place of the ray's slope changes, and of the length.

@@ -165,16 +165,16 @@ fn camera(app: &mut App, watched: &Watched) -> Entity {
 /// Whatever makes held frames wrong. Each changes what it finds.
 const CHANGES: [Change; 13] = [
     ("reset", start_over_change),
-    ("the camera moved", |app, w| {
+    ("the camera leapt", |app, w| {
         let camera = camera(app, w);
-        app.world_mut().get_mut::<Transform>(camera).expect("a camera").translation.x += 40.0;
+        app.world_mut().get_mut::<Transform>(camera).expect("a camera").translation.x += 400.0;
     }),
-    ("the camera turned", |app, w| {
+    ("the camera turned away", |app, w| {
         let camera = camera(app, w);
-        app.world_mut().get_mut::<Transform>(camera).expect("a camera").rotate_y(0.05);
+        app.world_mut().get_mut::<Transform>(camera).expect("a camera").rotate_y(0.6);
     }),
     ("the lens changed", |app, w| {
-        let lens = PerspectiveProjection { fov: 0.7, ..default() };
+        let lens = PerspectiveProjection { fov: 0.5, ..default() };
         let camera = camera(app, w);
         app.world_mut().entity_mut(camera).insert(Projection::Perspective(lens));
     }),
@@ -240,4 +240,43 @@ fn whatever_changes_starts_over_and_nothing_smears() {
         assert_eq!(difference(&stored, &fresh), 0.0, "{what}: the first frame is not a fresh one's");
         assert!(fresh.iter().any(|p| p[3] < 0.9), "{what}: no cloud is left to see");
     }
+}
+
+#[test]
+fn at_rest_again_the_window_is_exact_without_a_jump() {
+    const WINDOW: usize = 5;
+    let (mut app, watched) = watched_app();
+    app.insert_resource(quality(WINDOW as u32));
+    let turn = |app: &mut App, angle: f32| {
+        app.world_mut().get_mut::<Transform>(watched.view.camera).expect("a camera").rotate_y(angle);
+    };
+    for _ in 0..2 * WINDOW {
+        turn(&mut app, 0.004);
+        watched.step(&mut app, exposure());
+    }
+    let (mut frames, mut pictures): (Vec<Picture>, Vec<Picture>) = default();
+    for k in 0..3 * WINDOW {
+        let [stored, shown] = watched.step(&mut app, exposure());
+        frames.push(stored);
+        // The last frame in motion was seen from here as well.
+        if k + 1 >= WINDOW {
+            let error = difference(&shown, &mean(&frames[k + 1 - WINDOW..]));
+            assert!(error < 1e-5, "frame {k} at rest: {error:e}");
+        }
+        pictures.push(shown);
+    }
+    let apart = |a: &Picture, b: &Picture| {
+        let squares = a.as_flattened().iter().zip(b.as_flattened()).map(|(a, b)| (a - b).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    // From picture to picture no more changes than single frames differ by.
+    let noise = apart(&frames[0], &frames[1]);
+    for (k, pair) in pictures.windows(2).enumerate() {
+        let jump = apart(&pair[0], &pair[1]);
+        assert!(jump < 0.5 * noise, "frame {k} at rest: {jump} where frames are {noise} apart");
+    }
+    // And in motion it was no new start.
+    turn(&mut app, 0.004);
+    let [stored, shown] = watched.step(&mut app, exposure());
+    assert!(apart(&stored, &shown) > 0.2 * noise);
 }
