@@ -375,6 +375,7 @@ fn the_model_knows_nothing_of_the_renderer() {
                     "empty_medium",
                     "shell_intervals",
                     "shell_roots",
+                    "altitude",
                     "debug_value",
                 ];
                 assert!(known.contains(&name), "{path} imports {name} of the model");

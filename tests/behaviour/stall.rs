@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// What fields are set to, where it is of their type and in their range.
-const VALUES: [&str; 27] = [
+const VALUES: [&str; 28] = [
     "10",
     "0.03",
     "0.05",
@@ -40,6 +40,7 @@ const VALUES: [&str; 27] = [
     "half",
     "off",
     "sliding_window",
+    "four",
     "naive",
     "energy_conserving",
 ];
