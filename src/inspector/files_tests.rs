@@ -89,7 +89,7 @@ fn the_brightest_light_is_saved_as_the_sun() {
         current(&model, &lighting, &textures, lights.iter().map(|(light, place)| (light, place))).sun_elevation
     };
     assert_eq!(saved(&[]), None);
-    assert_eq!(saved(&[moon.clone(), sun.clone(), moon]), Some(12.34));
+    assert_eq!(saved(&[moon, sun, moon]), Some(12.34));
     // As it comes back from a file.
     assert_eq!(saved(&[light(1.0, saved(&[sun]).expect("a sun"))]), Some(12.34));
     assert_eq!(saved(&[light(1.0, -4.0)]), Some(-4.0));
