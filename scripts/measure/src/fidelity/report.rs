@@ -16,7 +16,7 @@ const TARGET_SCENES: [&str; 4] = ["ground_noon", "ground_backlit", "overcast", "
 const HEAD: &str = "# What each approximation costs in truth and in time
 
 A real-time cloud is a stack of approximations. Here each preset, and each approximation alone, is held against a path
-tracer that makes none of them (`CloudQuality::Reference`), and against our own march with steps so short that only the
+tracer that makes none of them (`CloudQuality::reference()`), and against our own march with steps so short that only the
 model of light is left to differ. Written by `scripts/fidelity`; edit that, not this file.
 ";
 
