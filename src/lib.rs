@@ -19,7 +19,7 @@
 //! settings (resources)  ->  textures (baked on the GPU or loaded as assets)  ->  model: "what is at p?"
 //!                                                                                  |  one shader interface
 //!    per camera:      sky light -> march -> accumulate -> composite   <------------+
-//!                     (after the opaque scene and sky, before tone mapping)
+//!                     (after the opaque scene) -> drawn among transparent things, or over them
 //! ```
 //!
 //! | plugin | what it adds |
@@ -55,18 +55,18 @@ pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
 };
-pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
+pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
-    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
-    CloudTextures, CloudView,
+    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudOrder, CloudPreset, CloudQuality, CloudSettings,
+    CloudTextureSlots, CloudTextures, CloudView,
 };
 
 /// What most users need.
 pub mod prelude {
     pub use crate::{
-        CloudBuffer, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
+        CloudBuffer, CloudDepth, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
+            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudOrder, CloudPreset, CloudQuality,
             CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
             PhaseFunction, TemporalMode, UpscaleBlock,
         },
@@ -136,7 +136,6 @@ fn missing_capability(world: &World) -> Option<String> {
         TextureFormat::Rgba8Unorm,
         TextureFormat::Rgba16Float,
         TextureFormat::Rgba32Float,
-        TextureFormat::Rg32Float,
         TextureFormat::R32Uint,
     ] {
         if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {

@@ -41,7 +41,7 @@ impl FromWorld for PathTracer {
                         unfiltered(),
                         depth_layout(multisampled),
                         write(TextureFormat::Rgba32Float),
-                        write(TextureFormat::Rg32Float),
+                        write(TextureFormat::Rgba32Float),
                         uniform_buffer::<Mat4>(false),
                         write(TextureFormat::Rgba32Float),
                     ),
