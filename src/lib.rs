@@ -132,12 +132,9 @@ fn missing_capability(world: &World) -> Option<String> {
             return Some(format!("{name}: {what} is {has}, and clouds need {needs}"));
         }
     }
-    for format in [
-        TextureFormat::Rgba8Unorm,
-        TextureFormat::Rgba16Float,
-        TextureFormat::Rgba32Float,
-        TextureFormat::R32Uint,
-    ] {
+    for format in
+        [TextureFormat::Rgba8Unorm, TextureFormat::Rgba16Float, TextureFormat::Rgba32Float, TextureFormat::R32Uint]
+    {
         if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {
             return Some(format!("{name}: {format:?} cannot be a storage texture"));
         }

@@ -277,13 +277,8 @@ fn view_bind_groups(
         }
     };
     let full_size = |id, label, layout: &[BindGroupLayoutDescriptor; 2], written: &TextureView| {
-        let entries = BindGroupEntries::sequential((
-            frame.clone(),
-            history.sum_after(),
-            &history.distances,
-            depth,
-            written,
-        ));
+        let entries =
+            BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth, written));
         (id, group(label, &layout[ms], &entries))
     };
     let handed_out = |image: Option<AssetId<Image>>| image.and_then(|id| images.get(id));

@@ -39,6 +39,7 @@ impl CloudBuffer {
 ///
 /// A material binds it as any other texture and asks the module `fade` how much of the cloud is before a fragment:
 /// ```wgsl
+/// import bevy_pbr::render::{forward_io::VertexOutput, mesh_view_bindings::view};
 /// import bevy_cumulus::render::composite::fade::cloud_fade;
 ///
 /// let pixel = vec2<i32>(mesh.position.xy - view.viewport.xy);

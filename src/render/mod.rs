@@ -106,9 +106,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
                     .before(main_transparent_pass_3d)
                     .in_set(Core3dSystems::MainPass),
                 // The other orders are drawn by the transparent pass itself.
-                passes::cloud_draw_over::<false>
-                    .after(Core3dSystems::MainPass)
-                    .before(Core3dSystems::EarlyPostProcess),
+                passes::cloud_draw_over::<false>.after(Core3dSystems::MainPass).before(Core3dSystems::EarlyPostProcess),
                 passes::cloud_draw_over::<true>
                     .after(Core3dSystems::EarlyPostProcess)
                     .before(Core3dSystems::PostProcess),

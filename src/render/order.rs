@@ -117,7 +117,9 @@ pub(crate) fn sort_in(
         };
         // Stable: among themselves all stay as they are. Along a ray nothing beyond the layer is nearer than what is
         // not, so nothing is torn out of its order that overlaps.
-        phase.items.sort_by_key(|key, thing| if *key == item { 1 } else { 2 * u8::from(!is_beyond(&thing.sorting_info)) });
+        phase
+            .items
+            .sort_by_key(|key, thing| if *key == item { 1 } else { 2 * u8::from(!is_beyond(&thing.sorting_info)) });
     }
 }
 
