@@ -78,6 +78,8 @@ const MODES: [(&str, &str); 5] = [
 ];
 /// The converged still: as many frames as a window holds.
 const CONVERGED: &str = "--set quality.temporal=sliding_window --set quality.window=16";
+/// Bevy's sky costs a software driver ten times what small clouds do, and no mode touches it.
+const SMALL_SKY: &str = "--no-sky";
 /// Frames of the converged still, and until every mode is at rest.
 const CONVERGED_AFTER: u32 = 16;
 const SETTLED: u32 = 40;
@@ -106,6 +108,7 @@ struct Row {
 struct Results {
     size: String,
     zoom: f64,
+    sky: bool,
     /// Motion and its rows, one for each mode.
     motions: Vec<(&'static Motion, Vec<Row>)>,
     machine: Machine,
@@ -132,7 +135,8 @@ pub fn run(options: &Options) -> Result<()> {
     let mut adapter = String::new();
     for motion in chosen {
         let stills = if motions.is_empty() { STILLS } else { 1 };
-        let rows = measure(&engine, motion, stills, &size, zoom, &progress)?;
+        let view = View { size: &size, zoom, sky: if common.full { "" } else { SMALL_SKY } };
+        let rows = measure(&engine, motion, stills, &view, &progress)?;
         adapter = engine.cost(motion.scene, &job(motion, 0, "moving"))?.adapter;
         motions.push((motion, rows));
     }
@@ -145,7 +149,14 @@ pub fn run(options: &Options) -> Result<()> {
         }
     }
     let report_path = common.report(&engine, "MOTION.md", options.only.is_empty());
-    let results = Results { size, zoom, motions, machine: Machine::this(&adapter), seconds: progress.seconds() };
+    let results = Results {
+        size,
+        zoom,
+        sky: common.full,
+        motions,
+        machine: Machine::this(&adapter),
+        seconds: progress.seconds(),
+    };
     drop(progress);
     fs::write(&report_path, report::write(&results))
         .with_context(|| format!("cannot write {}", report_path.display()))?;
@@ -155,6 +166,14 @@ pub fn run(options: &Options) -> Result<()> {
 
 fn job(motion: &Motion, mode: usize, what: &str) -> String {
     format!("{}_{mode}_{what}", motion.name)
+}
+
+/// What every picture has in common.
+struct View<'a> {
+    size: &'a str,
+    zoom: f64,
+    /// Option of `headless`, or nothing.
+    sky: &'a str,
 }
 
 /// Options that put camera, sun and clock where they are `k` frames after the start, and move nothing.
@@ -189,16 +208,10 @@ fn instant(motion: &Motion, effective: &Value, zoom: f64, k: u32) -> Result<Stri
     ))
 }
 
-fn measure(
-    engine: &Engine,
-    motion: &Motion,
-    stills: u32,
-    size: &str,
-    zoom: f64,
-    progress: &Progress,
-) -> Result<Vec<Row>> {
+fn measure(engine: &Engine, motion: &Motion, stills: u32, view: &View, progress: &Progress) -> Result<Vec<Row>> {
     let effective = engine.effective(&format!("--scene {}", motion.scene))?;
-    let (first, last) = (instant(motion, &effective, zoom, 0)?, instant(motion, &effective, zoom, FRAMES - 1)?);
+    let at = |k| Ok::<_, anyhow::Error>(format!("{} {}", instant(motion, &effective, view.zoom, k)?, view.sky));
+    let (first, last) = (at(0)?, at(FRAMES - 1)?);
     let [dx, dy, dz] = motion.metres;
     let moves = format!("--move {dx},{dy},{dz},{},0 --sun-move {},0 --dt {}", motion.yaw, motion.sun, motion.seconds);
     let new = |name: String, options: String, frames| Job { name, options, frames, picture: true };
@@ -210,7 +223,7 @@ fn measure(
             jobs.push(new(job(motion, mode, &format!("still{k}")), format!("{last} {options}"), SETTLED + k));
         }
     }
-    engine.render(motion.scene, size, &jobs, progress)?;
+    engine.render(motion.scene, view.size, &jobs, progress)?;
     let truth = Truth::exact(engine.picture(motion.scene, &job(motion, MODES.len(), "truth"))?)?;
     let mut rows = Vec::new();
     let mut pictures = Vec::new();
