@@ -30,7 +30,7 @@ pub fn write(results: &Results) -> String {
         machine.processor,
         results.size,
         zoomed(results.zoom),
-        if results.sky { "" } else { "on black in place of Bevy's sky, " },
+        if results.sky { "" } else { "over a plain sky in place of Bevy's, " },
         results.seconds / 60,
         results.seconds % 60,
         machine.about_times(),
