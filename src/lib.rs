@@ -39,6 +39,7 @@ pub mod reference;
 mod render;
 pub mod settings;
 pub mod textures;
+pub mod weather;
 
 use bevy::{
     prelude::*,

@@ -22,10 +22,11 @@ use super::{
     reproject::{HeldUniform, Pose},
 };
 use crate::{
-    model::{ModelUniform, TangentFrame, TexelSizes},
+    model::{ModelSettings, ModelUniform, TangentFrame, TexelSizes},
     reference::planet::PLANET_RADIUS,
     settings::{
-        CloudDebugView, CloudLighting, CloudModel, CloudQuality, CloudSettings, CloudView, GoodSettings, Validate,
+        CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudQuality, CloudSettings, CloudView, GoodSettings,
+        Validate,
     },
     textures::CloudTextureViews,
 };
@@ -217,7 +218,7 @@ pub(crate) fn prepare_views(
             None => first.insert(CloudHistory::new(&device, key, pose)),
         };
         let (window, held) = (history.frame, history.held_uniform());
-        let (model, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
+        let (model, layers, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
             world_from_view: pose.rotation,
@@ -230,7 +231,12 @@ pub(crate) fn prepare_views(
             window,
             debug: item.cloud.debug,
         });
-        let model = ModelUniform::new(&model, clouds.settings.clock.seconds, &space, sizes);
+        let model = ModelUniform::new(
+            &ModelSettings { model: &model, layers: &layers, zones: &[] },
+            clouds.settings.clock.seconds,
+            &space,
+            sizes,
+        );
         let world_from_local = Mat4::from_quat(space.local_from_world.inverse().as_quat());
         let mut own = None;
         let uniforms = match &mut item.uniforms {
@@ -256,11 +262,11 @@ pub(crate) fn prepare_views(
 }
 
 /// The settings with a debug view's changes made to them.
-fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLighting) {
+fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLayers, CloudLighting) {
     let (mut model, mut lighting) = (settings.model.clone(), settings.lighting.clone());
     debug.change_model(&mut model);
     debug.change_lighting(&mut lighting);
-    (model, lighting)
+    (model, settings.layers.clone(), lighting)
 }
 
 /// The tangent frame under a view: planet centre from the scene's atmosphere, else a radius below the world's origin.

@@ -2,6 +2,7 @@
 
 mod check;
 mod debug;
+mod layers;
 mod lighting;
 mod model;
 mod paths;
@@ -15,6 +16,7 @@ use bevy::prelude::*;
 pub use check::{SettingsError, Validate};
 pub use debug::CloudDebugView;
 pub(crate) use debug::DebugShader;
+pub use layers::{CloudLayer, CloudLayers, LayerKind, MAX_LAYERS, MapChannels};
 pub use lighting::{CloudLighting, PhaseFunction};
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
@@ -37,6 +39,7 @@ pub(crate) struct CloudSettingsPlugin;
 impl Plugin for CloudSettingsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CloudModel>()
+            .init_resource::<CloudLayers>()
             .init_resource::<CloudLighting>()
             .init_resource::<CloudQuality>()
             .init_resource::<CloudTextures>()
@@ -44,6 +47,7 @@ impl Plugin for CloudSettingsPlugin {
             .init_resource::<CloudClock>()
             .init_resource::<GoodSettings>()
             .register_type::<CloudModel>()
+            .register_type::<CloudLayers>()
             .register_type::<CloudLighting>()
             .register_type::<CloudQuality>()
             .register_type::<CloudTextures>()
@@ -65,6 +69,7 @@ impl Plugin for CloudSettingsPlugin {
                 Last,
                 (
                     keep_good::<CloudModel>,
+                    keep_good::<CloudLayers>,
                     keep_good::<CloudLighting>,
                     keep_good::<CloudQuality>,
                     keep_good::<CloudTextures>,
@@ -88,7 +93,7 @@ macro_rules! kept {
         })*
     };
 }
-kept!(CloudModel => model, CloudLighting => lighting, CloudQuality => quality,
+kept!(CloudModel => model, CloudLayers => layers, CloudLighting => lighting, CloudQuality => quality,
       CloudTextures => textures, CloudClock => clock);
 
 fn keep_good<S: Kept>(setting: Option<Res<S>>, mut good: ResMut<GoodSettings>, mut reported: Local<Option<String>>) {

@@ -36,7 +36,7 @@ fn slab(depth: f64, albedo: [f64; 3]) -> ModelShader {
         fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
             let h = altitude(p, {PLANET_RADIUS:?});
             if h < {BOTTOM:?} || h > {top:?} {{ return empty_medium(); }}
-            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, 0.5);
+            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, vec2(500.0));
         }}"
     ))
 }
