@@ -115,7 +115,8 @@ pub(crate) fn prepare_bind_groups(
     device: Res<RenderDevice>,
     status: Res<StatusFlags>,
 ) {
-    let mut ready = !views.is_empty();
+    // What layers read comes after what the thesis's layer does.
+    let mut ready = !views.is_empty() && !textures.maps_pending && !(textures.bake_pending && textures.shape.is_none());
     for item in &views {
         let own;
         let sky_light = match item.sky_light {

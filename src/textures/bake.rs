@@ -118,6 +118,10 @@ pub(crate) struct CloudTextureViews {
     pub weather: Option<TextureView>,
     pub weather_layers: [bool; MAX_LAYERS],
     pub weather_size: u32,
+    /// Whether more of them are to come.
+    pub maps_pending: bool,
+    /// Whether anything is still to be baked or loaded.
+    pub bake_pending: bool,
     /// Rg a curl field, b fibres, a cells.
     pub swirl: Option<TextureView>,
     pub generation: u64,
@@ -272,6 +276,7 @@ pub(super) fn plan(
             }
         }
     }
+    views.bake_pending = !satisfied;
     report(&mut bakery, satisfied, &wanted, &images, &progress);
 }
 

@@ -88,7 +88,7 @@ pub(super) fn report(
     let cells = &progress.0;
     let enabled = cells.enabled.load(Relaxed);
     let working = enabled && cells.asked.load(Relaxed) != cells.done.load(Relaxed);
-    let baking = working || enabled && (slots.loading || maps.pending);
+    let baking = working || enabled && (slots.loading || maps.published().pending);
     let now = CloudTextureStatus {
         baking,
         progress: if working { f32::from_bits(cells.share_bits.load(Relaxed)).min(0.999) } else { 1.0 },

@@ -56,8 +56,6 @@ pub(crate) struct LayerMaps {
     shown: [Option<(Source, Arc<WeatherMap>)>; MAX_LAYERS],
     /// Their pyramids, all of one size.
     published: WeatherMaps,
-    /// Whether a map is still to come.
-    pub(super) pending: bool,
 }
 
 /// Pyramids of the layers' maps, and a count of their changes.
@@ -65,6 +63,8 @@ pub(crate) struct LayerMaps {
 pub(crate) struct WeatherMaps {
     pub maps: [Option<Arc<WeatherPyramid>>; MAX_LAYERS],
     version: u32,
+    /// Whether a map is still to come.
+    pub(super) pending: bool,
 }
 
 impl LayerMaps {
@@ -164,7 +164,7 @@ pub(super) fn follow_layers(
         }
     }
     if good.0.layers.0.is_empty() && maps.entries.is_empty() {
-        maps.pending = false;
+        maps.published.pending = false;
         return;
     }
     let mut wanted = Vec::new();
@@ -183,7 +183,7 @@ pub(super) fn follow_layers(
         }
         wanted.push(source);
     }
-    maps.pending = pending;
+    maps.published.pending = pending;
     maps.entries.retain(|entry| wanted.contains(&entry.source));
     if changed {
         maps.publish();
@@ -216,9 +216,10 @@ impl LayerMaps {
 pub(super) struct Uploaded(Option<u32>);
 
 pub(super) fn extract(maps: Extract<Res<LayerMaps>>, mut out: ResMut<WeatherMaps>) {
-    if out.version != maps.published.version || maps.published.version == 0 {
+    if out.version != maps.published.version {
         *out = maps.published.clone();
     }
+    out.pending = maps.published.pending;
 }
 
 /// Uploads what has changed.
@@ -235,6 +236,7 @@ pub(super) fn upload(
         views.swirl = Some(array(&device, &queue, "cloud_swirl", &[&levels], TextureViewDimension::D2));
         uploaded.0 = None;
     }
+    views.maps_pending = maps.pending;
     if uploaded.0 == Some(maps.version) {
         return;
     }
