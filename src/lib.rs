@@ -57,8 +57,8 @@ pub use reference::{
 };
 pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
-    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
-    CloudTextures, CloudView,
+    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPhase, CloudPreset, CloudQuality, CloudSettings,
+    CloudTextureSlots, CloudTextures, CloudView,
 };
 
 /// What most users need.
@@ -66,7 +66,7 @@ pub mod prelude {
     pub use crate::{
         CloudBuffer, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
+            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPhase, CloudPreset, CloudQuality,
             CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
             PhaseFunction, TemporalMode, UpscaleBlock,
         },

@@ -5,6 +5,7 @@ mod buffer;
 mod frame;
 pub(crate) mod history;
 mod passes;
+mod phase_slots;
 mod pipelines;
 mod reproject;
 mod status;

@@ -19,13 +19,15 @@ use super::{
     bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey},
+    phase_slots::PhaseSlots,
     reproject::{HeldUniform, Pose},
 };
 use crate::{
     model::{ModelUniform, TangentFrame, TexelSizes},
     reference::planet::PLANET_RADIUS,
     settings::{
-        CloudDebugView, CloudLighting, CloudModel, CloudQuality, CloudSettings, CloudView, GoodSettings, Validate,
+        CloudDebugView, CloudLighting, CloudModel, CloudPhase, CloudQuality, CloudSettings, CloudView, GoodPhases,
+        GoodSettings, Validate,
     },
     textures::CloudTextureViews,
 };
@@ -34,6 +36,8 @@ use crate::{
 #[derive(Resource, Default)]
 pub(crate) struct ExtractedClouds {
     settings: CloudSettings,
+    /// Phase functions beside the lighting's own.
+    phases: Vec<CloudPhase>,
     /// Counts changes that make held frames wrong.
     version: u64,
 }
@@ -83,12 +87,17 @@ pub(crate) fn forget_lost_device(mut commands: Commands, views: Query<Entity, Wi
     }
 }
 
-pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut<ExtractedClouds>) {
+pub(crate) fn extract_settings(
+    good: Extract<Res<GoodSettings>>,
+    phases: Extract<Res<GoodPhases>>,
+    mut out: ResMut<ExtractedClouds>,
+) {
     // Time and a shifted origin move what is seen; frames held are moved along.
     out.settings.clock.clone_from(&good.0.clock);
     out.settings.model.world_offset = good.0.model.world_offset;
-    if out.settings != good.0 {
+    if out.settings != good.0 || out.phases != phases.0 {
         out.settings.clone_from(&good.0);
+        out.phases.clone_from(&phases.0);
         out.version += 1;
     }
 }
@@ -218,6 +227,7 @@ pub(crate) fn prepare_views(
         };
         let (window, held) = (history.frame, history.held_uniform());
         let (model, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
+        let phases = PhaseSlots::new(&lighting, &clouds.phases);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
             world_from_view: pose.rotation,
@@ -227,6 +237,7 @@ pub(crate) fn prepare_views(
             exposure: item.camera.exposure,
             quality: &item.cloud.quality,
             lighting: &lighting,
+            phases: &phases,
             window,
             debug: item.cloud.debug,
         });

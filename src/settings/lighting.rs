@@ -3,20 +3,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The angular distribution of scattered light. Each integrates to 1 over the sphere.
-#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[reflect(Default, Serialize, Deserialize, PartialEq)]
-pub enum PhaseFunction {
-    /// 1/4π: no direction is preferred.
-    Isotropic,
-    /// Henyey–Greenstein with asymmetry `g` (thesis, equation 3.11).
-    HenyeyGreenstein,
-    /// `(1 − lobe_mix)·HG(g) + lobe_mix·HG(g_back)`.
-    TwoLobe,
-    /// Jendersie & d'Eon's fit to Mie scattering from `droplet_diameter` (thesis, 3.13 to 3.17); the default.
-    #[default]
-    HgDraine,
-}
+use super::PhaseFunction;
 
 /// Scattering, phase function and ambient light.
 ///
@@ -48,9 +35,10 @@ pub struct CloudLighting {
     /// Asymmetry of that light: how much of it goes on away from the sun (0 all ways alike). Default 0.38, fitted.
     #[reflect(@0.0..=0.9_f32)]
     pub diffusion_asymmetry: f32,
-    /// The phase function. Default [`PhaseFunction::HgDraine`].
+    /// The phase function of layers that have none of their own. Default [`PhaseFunction::HgDraine`].
     pub phase: PhaseFunction,
-    /// Asymmetry of Henyey–Greenstein and of the forward lobe (−1 back, 1 forward). Default 0.8.
+    /// Asymmetry of Henyey–Greenstein, Cornette–Shanks, Schlick and of the forward lobe (−1 back, 1 forward).
+    /// Default 0.8.
     #[reflect(@-0.99..=0.99_f32)]
     pub g: f32,
     /// Asymmetry of the second lobe of [`PhaseFunction::TwoLobe`]. Default −0.3.

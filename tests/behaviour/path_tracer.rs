@@ -7,7 +7,7 @@ use bevy_cumulus::{
     CloudNoise, CloudsPlugin, ModelShader,
     prelude::*,
     reference::{
-        phase::{HgDraine, Phase, hg},
+        phase::{HgDraine, Phase, hg, schlick_k},
         planet::PLANET_RADIUS,
     },
 };
@@ -36,7 +36,7 @@ fn slab(depth: f64, albedo: [f64; 3]) -> ModelShader {
         fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
             let h = altitude(p, {PLANET_RADIUS:?});
             if h < {BOTTOM:?} || h > {top:?} {{ return empty_medium(); }}
-            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, 0.5);
+            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, 0.5, vec4(1.0, 0.0, 0.0, 0.0));
         }}"
     ))
 }
@@ -242,6 +242,10 @@ fn directions_follow_the_phase_function() {
         Phase::HenyeyGreenstein { g: -0.4 },
         Phase::TwoLobe { g: 0.8, g_back: -0.3, mix: 0.3 },
         draine,
+        Phase::Rayleigh,
+        Phase::CornetteShanks { g: 0.7 },
+        Phase::Schlick { k: schlick_k(0.75) },
+        Phase::Schlick { k: -0.4 },
     ];
     for phase in phases {
         let (kind, params) = phase.shader_parameters();
