@@ -58,7 +58,7 @@ pub use reference::{
 pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPhase, CloudPreset, CloudQuality, CloudSettings,
-    CloudTextureSlots, CloudTextures, CloudView,
+    CloudTextureSlots, CloudTextures, CloudView, ModelPhases,
 };
 
 /// What most users need.

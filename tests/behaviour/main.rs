@@ -16,6 +16,7 @@ mod intervals;
 mod motion;
 mod occlusion;
 mod path_tracer;
+mod phase_slots;
 mod phases;
 mod sampling_patterns;
 mod schedule;
