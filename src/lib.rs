@@ -35,6 +35,7 @@
 #[cfg(feature = "inspector")]
 pub mod inspector;
 mod model;
+pub mod phases;
 pub mod reference;
 mod render;
 pub mod settings;
@@ -51,6 +52,7 @@ use bevy::{
 };
 
 pub use model::ModelShader;
+pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
 pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
@@ -91,6 +93,7 @@ impl Plugin for CloudsPlugin {
             settings::CloudSettingsPlugin,
             textures::CloudTexturesPlugin,
             model::CloudModelPlugin,
+            phases::CloudPhasesPlugin,
             render::CloudRenderPlugin,
         ));
     }
@@ -124,7 +127,7 @@ fn missing_capability(world: &World) -> Option<String> {
     let limits = device.limits();
     for (what, has, needs) in [
         ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 3),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 1),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 2),
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 128),
         ("max_bind_groups", limits.max_bind_groups, 3),
     ] {

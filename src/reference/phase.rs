@@ -147,7 +147,8 @@ impl Phase {
         Self::of(&lighting.into())
     }
 
-    /// The phase function of a layer.
+    /// The phase function of a layer. For those that are tables it is what stands in for them until they are there:
+    /// see [`PhaseFunction`].
     ///
     /// # Errors
     /// As [`from_settings`](Self::from_settings).
@@ -160,7 +161,11 @@ impl Phase {
             PhaseFunction::CornetteShanks => Self::CornetteShanks { g },
             PhaseFunction::Schlick => Self::Schlick { k: schlick_k(g) },
             PhaseFunction::TwoLobe => Self::TwoLobe { g, g_back: phase.g_back.into(), mix: phase.lobe_mix.into() },
-            PhaseFunction::HgDraine => Self::HgDraine(HgDraine::from_diameter(phase.droplet_diameter.into())?),
+            PhaseFunction::HgDraine | PhaseFunction::Mie => {
+                Self::HgDraine(HgDraine::from_diameter(phase.droplet_diameter.into())?)
+            }
+            PhaseFunction::Ice => Self::HgDraine(super::ice::stand_in()),
+            PhaseFunction::Table => Self::HenyeyGreenstein { g },
         })
     }
 

@@ -141,7 +141,7 @@ impl FrameUniform {
                 quality.offsets.into(),
             ),
             layers: UVec4::new(window.layer(), window.leaving_layer(), window.layers(), window.held_before),
-            debug: UVec4::new(input.debug.shader_mode(), window.index, quality.seed, 0),
+            debug: UVec4::new(input.debug.shader_mode(), window.index, quality.seed, phases.is_coloured().into()),
         }
     }
 }

@@ -24,6 +24,7 @@ use super::{
 };
 use crate::{
     model::{ModelUniform, TangentFrame, TexelSizes},
+    phases::ReadyTables,
     reference::planet::PLANET_RADIUS,
     settings::{
         CloudDebugView, CloudLighting, CloudModel, CloudPhase, CloudQuality, CloudSettings, CloudView, GoodPhases,
@@ -38,6 +39,7 @@ pub(crate) struct ExtractedClouds {
     settings: CloudSettings,
     /// Phase functions beside the lighting's own.
     phases: Vec<CloudPhase>,
+    pub(super) tables: ReadyTables,
     /// Counts changes that make held frames wrong.
     version: u64,
 }
@@ -90,6 +92,7 @@ pub(crate) fn forget_lost_device(mut commands: Commands, views: Query<Entity, Wi
 pub(crate) fn extract_settings(
     good: Extract<Res<GoodSettings>>,
     phases: Extract<Res<GoodPhases>>,
+    tables: Extract<Res<ReadyTables>>,
     mut out: ResMut<ExtractedClouds>,
 ) {
     // Time and a shifted origin move what is seen; frames held are moved along.
@@ -98,6 +101,10 @@ pub(crate) fn extract_settings(
     if out.settings != good.0 || out.phases != phases.0 {
         out.settings.clone_from(&good.0);
         out.phases.clone_from(&phases.0);
+        out.version += 1;
+    }
+    if out.tables.generation != tables.generation {
+        out.tables.clone_from(&tables);
         out.version += 1;
     }
 }
@@ -227,7 +234,7 @@ pub(crate) fn prepare_views(
         };
         let (window, held) = (history.frame, history.held_uniform());
         let (model, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
-        let phases = PhaseSlots::new(&lighting, &clouds.phases);
+        let phases = PhaseSlots::new(&lighting, &clouds.phases, &clouds.tables);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
             world_from_view: pose.rotation,

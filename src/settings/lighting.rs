@@ -47,9 +47,12 @@ pub struct CloudLighting {
     /// Share of the second lobe (0..1). Default 0.3.
     #[reflect(@0.0..=1.0_f32)]
     pub lobe_mix: f32,
-    /// Droplet diameter of [`PhaseFunction::HgDraine`] (µm). Default 12.
+    /// Droplet diameter of [`PhaseFunction::HgDraine`] and [`PhaseFunction::Mie`] (µm). Default 12.
     #[reflect(@5.0..=50.0_f32)]
     pub droplet_diameter: f32,
+    /// Strength of the 22° halo of [`PhaseFunction::Ice`] (0 rough crystals, 1 smooth prisms). Default 0.
+    #[reflect(@0.0..=1.0_f32)]
+    pub halo: f32,
     /// Upper bound of a phase value (1/sr). The diffraction peak of real droplets reaches 10²…10⁴ within a
     /// degree of the sun and would alias. What is cut there is lost: at 12 µm 2 % of single scattering with the
     /// default, 28 % (all within 1.6° of the sun) with 30. Default 500.
@@ -96,6 +99,7 @@ impl Default for CloudLighting {
             g_back: -0.3,
             lobe_mix: 0.3,
             droplet_diameter: 12.0,
+            halo: 0.0,
             phase_limit: 500.0,
             sun_strength: 1.0,
             ambient_strength: 1.15,

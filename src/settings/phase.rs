@@ -24,6 +24,15 @@ pub enum PhaseFunction {
     /// Jendersie & d'Eon's fit to Mie scattering from `droplet_diameter` (thesis, 3.13 to 3.17); the default.
     #[default]
     HgDraine,
+    /// Mie's theory itself for droplets of `droplet_diameter`, in colour: fogbow, glory and corona. Computed in the
+    /// background, in a fraction of a second at 10 µm and seconds at 50; until then it is the fit above, as it always is
+    /// in octaves after the first.
+    Mie,
+    /// The ice crystals of cirrus, rough ones, with a 22° halo of strength `halo`. Octaves after the first have no halo.
+    Ice,
+    /// A table of your own, from [`CloudPhaseTables`](crate::CloudPhaseTables); in octaves after the first
+    /// Henyey–Greenstein with the table's asymmetry. Until it is loaded, Henyey–Greenstein with `g`.
+    Table,
 }
 
 /// The phase function of one cloud layer, with its parameters.
@@ -43,9 +52,12 @@ pub struct CloudPhase {
     /// Share of the second lobe (0..1). Default 0.3.
     #[reflect(@0.0..=1.0_f32)]
     pub lobe_mix: f32,
-    /// Droplet diameter of [`PhaseFunction::HgDraine`] (µm). Default 12.
+    /// Droplet diameter of [`PhaseFunction::HgDraine`] and [`PhaseFunction::Mie`] (µm). Default 12.
     #[reflect(@5.0..=50.0_f32)]
     pub droplet_diameter: f32,
+    /// Strength of the 22° halo of [`PhaseFunction::Ice`] (0 rough crystals, 1 smooth prisms). Default 0.
+    #[reflect(@0.0..=1.0_f32)]
+    pub halo: f32,
 }
 
 impl Default for CloudPhase {
@@ -62,6 +74,7 @@ impl From<&CloudLighting> for CloudPhase {
             g_back: lighting.g_back,
             lobe_mix: lighting.lobe_mix,
             droplet_diameter: lighting.droplet_diameter,
+            halo: lighting.halo,
         }
     }
 }

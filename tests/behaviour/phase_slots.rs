@@ -14,12 +14,12 @@ use crate::{
     view::{View, cloud_pixels, spawn_sun, until_drawn},
 };
 
-fn of(function: PhaseFunction, g: f32) -> CloudPhase {
+pub fn of(function: PhaseFunction, g: f32) -> CloudPhase {
     CloudPhase { function, g, ..default() }
 }
 
 /// Single scattering, unshadowed and unsmoothed.
-fn single(app: &mut App, lighting: CloudLighting) {
+pub fn single(app: &mut App, lighting: CloudLighting) {
     app.insert_resource(CloudLighting { octaves: 1, diffusion: 0.0, ambient_strength: 0.0, ..lighting });
     app.insert_resource(CloudQuality {
         resolution: MarchResolution::Full,
@@ -36,7 +36,7 @@ fn single(app: &mut App, lighting: CloudLighting) {
 }
 
 /// The picture's middle with the sun at this angle from the camera's direction, straight up.
-fn middle(app: &mut App, view: &View, sun: Entity, degrees: f32) -> Vec4 {
+pub fn middle(app: &mut App, view: &View, sun: Entity, degrees: f32) -> Vec4 {
     let towards = Quat::from_rotation_z(degrees.to_radians()) * Vec3::Y;
     app.world_mut().entity_mut(sun).insert(Transform::default().looking_to(-towards, Vec3::Z));
     run_updates(app, 1);
