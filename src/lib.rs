@@ -35,6 +35,7 @@
 #[cfg(feature = "inspector")]
 pub mod inspector;
 mod model;
+pub mod phases;
 pub mod reference;
 mod render;
 pub mod settings;
@@ -52,14 +53,15 @@ use bevy::{
 };
 
 pub use model::ModelShader;
+pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
 pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
 };
 pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
-    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
-    CloudTextures, CloudView,
+    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPhase, CloudPreset, CloudQuality, CloudSettings,
+    CloudTextureSlots, CloudTextures, CloudView, ModelPhases,
 };
 
 /// What most users need.
@@ -67,7 +69,7 @@ pub mod prelude {
     pub use crate::{
         CloudBuffer, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
+            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPhase, CloudPreset, CloudQuality,
             CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
             PhaseFunction, TemporalMode, UpscaleBlock,
         },
@@ -92,6 +94,7 @@ impl Plugin for CloudsPlugin {
             settings::CloudSettingsPlugin,
             textures::CloudTexturesPlugin,
             model::CloudModelPlugin,
+            phases::CloudPhasesPlugin,
             render::CloudRenderPlugin,
         ));
     }
@@ -125,7 +128,7 @@ fn missing_capability(world: &World) -> Option<String> {
     let limits = device.limits();
     for (what, has, needs) in [
         ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 3),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 1),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 2),
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 128),
         ("max_bind_groups", limits.max_bind_groups, 3),
     ] {

@@ -5,6 +5,7 @@ mod buffer;
 mod frame;
 pub(crate) mod history;
 mod passes;
+pub(crate) mod phase_slots;
 mod pipelines;
 mod reproject;
 mod status;
@@ -25,6 +26,7 @@ use crate::model::ModelBindings;
 
 pub use buffer::{CloudBuffer, CloudFrame, CloudNoise};
 pub(crate) use frame::FrameUniform;
+pub(crate) use phase_slots::{PHASE_SLOTS, phase_tables_layout};
 pub(crate) use pipelines::depth_layout;
 pub use status::CloudStatus;
 pub(crate) use status::StatusFlags;
@@ -36,6 +38,7 @@ impl Plugin for CloudRenderPlugin {
     fn build(&self, app: &mut App) {
         load_shader_library!(app, "frame.wesl");
         load_shader_library!(app, "march/phase.wesl");
+        load_shader_library!(app, "march/table.wesl");
         load_shader_library!(app, "march/integrate.wesl");
         load_shader_library!(app, "march/lighting.wesl");
         load_shader_library!(app, "march/aerial.wesl");
@@ -64,6 +67,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
         .init_resource::<view::ExtractedClouds>()
         .init_gpu_resource::<ModelBindings>()
         .init_gpu_resource::<pipelines::CloudPipelines>()
+        .init_gpu_resource::<phase_slots::PhaseTableBuffer>()
         .add_systems(RenderStartup, view::forget_lost_device)
         .add_systems(ExtractSchedule, (view::extract_settings, view::extract_views))
         .add_systems(
@@ -78,6 +82,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
                     .chain()
                     .after(crate::textures::TextureSwaps)
                     .in_set(RenderSystems::PrepareResources),
+                phase_slots::write_phase_tables.in_set(RenderSystems::PrepareResources),
                 bind_groups::prepare_bind_groups.in_set(RenderSystems::PrepareBindGroups),
             ),
         )

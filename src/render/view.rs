@@ -19,14 +19,16 @@ use super::{
     bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey},
+    phase_slots::PhaseSlots,
     reproject::{HeldUniform, Pose},
 };
 use crate::{
     model::{ModelSettings, ModelUniform, TangentFrame, TexelSizes},
+    phases::ReadyTables,
     reference::planet::PLANET_RADIUS,
     settings::{
-        CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudQuality, CloudSettings, CloudView, GoodSettings,
-        Validate,
+        CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudPhase, CloudQuality, CloudSettings, CloudView,
+        GoodPhases, GoodSettings, Validate,
     },
     textures::CloudTextureViews,
 };
@@ -35,6 +37,9 @@ use crate::{
 #[derive(Resource, Default)]
 pub(crate) struct ExtractedClouds {
     settings: CloudSettings,
+    /// Phase functions beside the lighting's own.
+    phases: Vec<CloudPhase>,
+    pub(super) tables: ReadyTables,
     /// Counts changes that make held frames wrong.
     version: u64,
 }
@@ -84,12 +89,22 @@ pub(crate) fn forget_lost_device(mut commands: Commands, views: Query<Entity, Wi
     }
 }
 
-pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut<ExtractedClouds>) {
+pub(crate) fn extract_settings(
+    good: Extract<Res<GoodSettings>>,
+    phases: Extract<Res<GoodPhases>>,
+    tables: Extract<Res<ReadyTables>>,
+    mut out: ResMut<ExtractedClouds>,
+) {
     // Time and a shifted origin move what is seen; frames held are moved along.
     out.settings.clock.clone_from(&good.0.clock);
     out.settings.model.world_offset = good.0.model.world_offset;
-    if out.settings != good.0 {
+    if out.settings != good.0 || out.phases != phases.0 {
         out.settings.clone_from(&good.0);
+        out.phases.clone_from(&phases.0);
+        out.version += 1;
+    }
+    if out.tables.generation != tables.generation {
+        out.tables.clone_from(&tables);
         out.version += 1;
     }
 }
@@ -219,6 +234,7 @@ pub(crate) fn prepare_views(
         };
         let (window, held) = (history.frame, history.held_uniform());
         let (model, layers, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
+        let phases = PhaseSlots::new(&lighting, &clouds.phases, &clouds.tables);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
             world_from_view: pose.rotation,
@@ -228,6 +244,7 @@ pub(crate) fn prepare_views(
             exposure: item.camera.exposure,
             quality: &item.cloud.quality,
             lighting: &lighting,
+            phases: &phases,
             window,
             debug: item.cloud.debug,
         });

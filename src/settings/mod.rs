@@ -6,6 +6,7 @@ mod layers;
 mod lighting;
 mod model;
 mod paths;
+mod phase;
 mod preset;
 mod quality;
 mod textures;
@@ -17,9 +18,11 @@ pub use check::{SettingsError, Validate};
 pub use debug::CloudDebugView;
 pub(crate) use debug::DebugShader;
 pub use layers::{CloudLayer, CloudLayers, LayerKind, MAX_LAYERS, MapChannels};
-pub use lighting::{CloudLighting, PhaseFunction};
+pub use lighting::CloudLighting;
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
+pub(crate) use phase::GoodPhases;
+pub use phase::{CloudPhase, ModelPhases, PhaseFunction};
 pub use preset::{CloudPreset, PresetError};
 pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
@@ -46,6 +49,8 @@ impl Plugin for CloudSettingsPlugin {
             .init_resource::<CloudTextureSlots>()
             .init_resource::<CloudClock>()
             .init_resource::<GoodSettings>()
+            .init_resource::<ModelPhases>()
+            .init_resource::<GoodPhases>()
             .register_type::<CloudModel>()
             .register_type::<CloudLayers>()
             .register_type::<CloudLighting>()
@@ -56,6 +61,8 @@ impl Plugin for CloudSettingsPlugin {
             .register_type::<CloudView>()
             .register_type::<CloudDebugView>()
             .register_type::<CloudPreset>()
+            .register_type::<CloudPhase>()
+            .register_type::<ModelPhases>()
             .init_asset::<CloudPreset>()
             .init_asset_loader::<preset::CloudPresetLoader>()
             .add_systems(
@@ -74,6 +81,7 @@ impl Plugin for CloudSettingsPlugin {
                     keep_good::<CloudQuality>,
                     keep_good::<CloudTextures>,
                     keep_good::<CloudClock>,
+                    phase::keep_good_phases,
                 )
                     .chain()
                     .in_set(KeepGood),

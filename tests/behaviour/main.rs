@@ -16,6 +16,8 @@ mod intervals;
 mod motion;
 mod occlusion;
 mod path_tracer;
+mod phase_slots;
+mod phase_tables;
 mod phases;
 mod sampling_patterns;
 mod schedule;

@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// What fields are set to, where it is of their type and in their range.
-const VALUES: [&str; 28] = [
+const VALUES: [&str; 34] = [
     "10",
     "0.03",
     "0.05",
@@ -33,7 +33,13 @@ const VALUES: [&str; 28] = [
     "1,2,3",
     "0.5,0.6,0.7",
     "isotropic",
+    "rayleigh",
+    "cornette_shanks",
+    "schlick",
     "two_lobe",
+    "mie",
+    "ice",
+    "table",
     "subtract",
     "full",
     "quarter",
