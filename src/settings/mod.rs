@@ -26,7 +26,7 @@ pub use phase::{CloudPhase, ModelPhases, PhaseFunction};
 pub use preset::{CloudPreset, PresetError};
 pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
-pub use view::{CloudClock, CloudView};
+pub use view::{CloudClock, CloudOrder, CloudView};
 
 /// The last good value of each setting: what the renderer sees. A bad change is reported once and ignored.
 #[derive(Resource, Clone, Debug, Default)]
@@ -59,6 +59,7 @@ impl Plugin for CloudSettingsPlugin {
             .register_type::<CloudTextureSlots>()
             .register_type::<CloudClock>()
             .register_type::<CloudView>()
+            .register_type::<CloudOrder>()
             .register_type::<CloudDebugView>()
             .register_type::<CloudPreset>()
             .register_type::<CloudPhase>()

@@ -216,6 +216,7 @@ fn settings_are_read_back_as_written() {
             quality: Some(settings.quality),
             reset: 7,
             debug: CloudDebugView::Steps,
+            order: CloudOrder::AfterTransparent,
         });
         round_trip(&CloudPreset {
             model: settings.model,
