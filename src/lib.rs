@@ -39,6 +39,7 @@ pub mod reference;
 mod render;
 pub mod settings;
 pub mod textures;
+pub mod weather;
 
 use bevy::{
     prelude::*,
@@ -70,6 +71,7 @@ pub mod prelude {
             CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
             PhaseFunction, TemporalMode, UpscaleBlock,
         },
+        weather::{WeatherMap, WeatherRecipe},
     };
 }
 

@@ -27,6 +27,7 @@ mod stall;
 mod textures;
 mod twins;
 mod view;
+mod weather;
 mod window;
 #[cfg(target_os = "linux")]
 mod window_driven;
