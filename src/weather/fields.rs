@@ -198,7 +198,7 @@ impl Row<'_> {
             tall += r.front * 0.8 * band;
         }
         let regional = if r.height_variation > 0.0 { 0.5 + 0.7 * self.height.at(place) } else { 0.0 };
-        let height = (0.55 * tall + 0.55 * regional).clamp(0.0, 1.0);
+        let height = (0.85 * tall + 0.5 * (regional - 0.4)).clamp(0.0, 1.0);
         let base = if r.base_variation > 0.0 { (0.5 + 0.6 * self.base.at(place)).clamp(0.0, 1.0) } else { 0.0 };
         Texel { potential, height, base }
     }
@@ -221,8 +221,9 @@ impl Row<'_> {
         // Walls of open cells swell where they meet and have gaps.
         let open = wall * (0.4 + 0.8 * large.growth);
         let body = closed + (open - closed) * r.open_cells;
-        let edge = 0.35 * (small.bump - 0.5) + 0.3 * self.shreds.at(place);
-        let growth = large.growth * (0.35 + 0.65 * large.bump);
+        let edge = 0.4 * (small.bump - 0.5) + 0.45 * self.shreds.at(place);
+        // A dome over each cell, the larger the higher.
+        let growth = 0.15 + 0.85 * body * (0.5 + 0.5 * large.growth);
         (2.0 * body - 1.0 + 1.2 * r.raggedness * edge, growth)
     }
 
