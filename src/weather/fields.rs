@@ -231,7 +231,7 @@ impl Row<'_> {
     fn streets(&mut self, place: [f32; 2]) -> f32 {
         let (waves, bend, breaks) = &mut self.streets;
         let turns = phase(*waves, place) + 0.22 * bend.at(place);
-        0.95 * wave(turns) + 0.9 * breaks.at(place)
+        0.95 * wave(turns) + 1.1 * breaks.at(place)
     }
 
     /// Rolls, here long and there broken into grains.
