@@ -76,8 +76,10 @@ impl WeatherMap {
     /// finite change nothing.
     pub fn stamp_storm(&mut self, centre: Vec2, radius: f32, storm: &StormCell) {
         let cells = 2.0 / f64::from(radius.max(1e-4));
-        let outline = Octaves::new(storm.seed, cells, 23.0, self.size().max_element(), 4);
-        let mut outline = outline.reader();
+        let noise = |seed, cells| Octaves::new(seed, cells, 23.0, self.size().max_element(), 4);
+        // Small towers need a finer outline.
+        let (outline, fine) = (noise(storm.seed, cells), noise(!storm.seed, 3.0 * cells));
+        let (mut outline, mut fine) = (outline.reader(), fine.reader());
         let (sin, cos) = sin_cos(f64::from(storm.anvil_direction));
         let ahead = Vec2::new(cos as f32, sin as f32);
         let reach = radius * (storm.anvil + 2.0).max(4.0);
@@ -86,7 +88,7 @@ impl WeatherMap {
             let ragged = outline.at(place);
             let at = Vec2::new(offset.dot(ahead), offset.dot(ahead.perp())) / radius;
             storm.anvil_at(texel, at, ragged);
-            storm.flank_at(texel, at, ragged);
+            storm.flank_at(texel, at, 0.4 * ragged + fine.at(place));
             storm.tower_at(texel, at, ragged, 1.0, storm.height);
         });
     }
@@ -121,7 +123,8 @@ impl WeatherMap {
 impl StormCell {
     /// One tower, `radius` wide; `at` is in radii of the main one, from its centre.
     fn tower_at(&self, texel: &mut Vec3, at: Vec2, ragged: f32, radius: f32, height: f32) {
-        let distance = at.length() / radius + 0.16 * ragged;
+        // Small towers are as ragged as the large one.
+        let distance = at.length() / radius + 0.16 * ragged / radius.sqrt();
         let body = smoothstep(1.0, 0.7, distance);
         if body <= 0.0 {
             return;
@@ -135,18 +138,19 @@ impl StormCell {
 
     /// Smaller towers behind and to the right of the way the anvil goes, each lower than the one before.
     fn flank_at(&self, texel: &mut Vec3, at: Vec2, ragged: f32) {
-        let behind = Vec2::new(-0.8, 0.6);
-        // Farthest first: nearer ones stand before them.
-        for (along, radius, height) in [(2.75, 0.3, 0.3), (2.2, 0.38, 0.42), (1.65, 0.46, 0.55), (1.0, 0.58, 0.75)] {
-            if self.flank > 0.0 {
-                self.tower_at(
-                    texel,
-                    at - behind * along,
-                    ragged,
-                    radius * self.flank,
-                    self.height * height * self.flank,
-                );
-            }
+        if self.flank <= 0.0 {
+            return;
+        }
+        // Place, radius and height; the farthest first, as nearer ones stand before them.
+        let towers = [
+            (Vec2::new(-2.0, 1.95), 0.24, 0.22),
+            (Vec2::new(-1.75, 1.45), 0.34, 0.34),
+            (Vec2::new(-1.45, 0.95), 0.42, 0.48),
+            (Vec2::new(-1.0, 0.7), 0.5, 0.6),
+            (Vec2::new(-0.65, 0.35), 0.6, 0.78),
+        ];
+        for (place, radius, height) in towers {
+            self.tower_at(texel, at - place, ragged, radius * self.flank.sqrt(), self.height * height * self.flank);
         }
     }
 
@@ -155,17 +159,15 @@ impl StormCell {
         if self.anvil <= 0.0 {
             return;
         }
-        // 0 a little behind the tower, 1 at the tip.
-        let along = (at.x + 1.4) / (self.anvil + 1.4);
-        let half_width = 1.4 + 0.35 * self.anvil * along;
-        let across = (at.y / half_width).abs();
-        let edge = (along * 2.0 - 1.0).abs().max(0.0);
-        let inside = 1.0 - (edge * edge * edge * edge + across * across * across).min(2.0) + 0.22 * ragged;
-        let spread = smoothstep(0.0, 0.45, inside);
+        // An egg, its narrow end a little behind the tower: 0 there, 1 at the tip.
+        let along = (at.x + 1.5) / (self.anvil + 1.5);
+        let half_width = (0.9 + 0.4 * self.anvil) * (0.55 + 0.6 * along);
+        let from_middle = Vec2::new(2.0 * along - 1.0, at.y / half_width).length();
+        let spread = smoothstep(1.0, 0.8 - 0.35 * along.clamp(0.0, 1.0), from_middle + 0.18 * ragged);
         if spread <= 0.0 {
             return;
         }
-        let coverage = spread * (0.85 - 0.45 * along);
+        let coverage = spread * (0.9 - 0.4 * along);
         *texel = Vec3::new(
             texel.x + (coverage - texel.x) * spread,
             texel.y + (self.anvil_height - texel.y) * spread,

@@ -1,7 +1,7 @@
 //! Where a recipe's clouds gather, before the cover decides how many of them there are.
 
 use super::{
-    lattice::{Lattice, wave_vector},
+    lattice::{Lattice, sin_cos, wave_vector},
     noise::{Cellular, Fractal, Octaves, hash, smoothstep, wave},
     recipe::WeatherRecipe,
 };
@@ -99,7 +99,7 @@ impl<'a> Fields<'a> {
                 along(Stream::RippleBreaks, waves / 1.6, waves / 4.0, ripple_turn, 3),
             ),
             streaks: (
-                noise(Stream::StreakBend, r.streak_length * 1.3, 2),
+                noise(Stream::StreakBend, r.streak_length * 0.6, 3),
                 along(Stream::Streaks, length, fibres, streak_turn, 4),
             ),
             height: noise(Stream::Height, r.height_size, 3),
@@ -132,13 +132,13 @@ impl<'a> Fields<'a> {
 
 /// Of the directions whose line closes on itself after few repeats, the nearest.
 fn front_vector(degrees: f64) -> [i32; 2] {
-    let [[x, y], [_, _]] = [wave_vector(1e4, degrees), [0, 0]].map(|v| v.map(f64::from));
-    let short = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
-    let all = short.iter().flat_map(|&[a, b]| [[a, b], [-a, -b]]);
+    let (sin, cos) = sin_cos(degrees);
     let cosine = |[a, b]: [i32; 2]| {
         let (a, b) = (f64::from(a), f64::from(b));
-        (a * x + b * y) / (a * a + b * b).sqrt()
+        (a * cos + b * sin) / (a * a + b * b).sqrt()
     };
+    let half = [[1, 0], [2, 1], [1, 1], [1, 2], [0, 1], [-1, 2], [-1, 1], [-2, 1]];
+    let all = half.iter().flat_map(|&[a, b]| [[a, b], [-a, -b]]);
     all.fold([1, 0], |best, next| if cosine(next) > cosine(best) + 1e-6 { next } else { best })
 }
 
@@ -250,9 +250,9 @@ impl Row<'_> {
         let r = self.recipe;
         let (bend, fibres) = &mut self.streaks;
         let bent = bend.at(place);
-        let reach = 0.1 * r.streak_length / r.scale * bent;
+        let reach = 0.035 * r.streak_length / r.scale * bent;
         let there = [place[0] + reach, place[1] - reach];
-        1.3 * fibres.at(there) + 0.9 * bent
+        1.4 * fibres.at(there) + 0.45 * bent
     }
 
     /// 1 in the middle of a clearing, 0 outside.

@@ -6,7 +6,7 @@ use thiserror::Error;
 use super::{
     convert::picture_channel,
     map::WeatherMap,
-    noise::smoothstep,
+    noise::{Octaves, smoothstep},
     steering::{LclFormula, Steering, lifting_condensation_level},
 };
 use crate::{
@@ -86,11 +86,6 @@ impl Terrain {
         Self::new(size, red.into_iter().map(|share| low + (high - low) * share).collect())
     }
 
-    /// The lowest height (m).
-    pub fn lowest(&self) -> f32 {
-        self.heights.iter().copied().fold(f32::INFINITY, f32::min)
-    }
-
     /// Height (m) at a place in repeats of the map, filtered.
     pub fn height(&self, place: Vec2) -> f32 {
         let at = (place - place.floor()) * self.size.as_vec2() - 0.5;
@@ -137,11 +132,14 @@ pub fn orographic(map: &mut WeatherMap, terrain: &Terrain, air: &Steering, scale
     let missing = (base - air.mixed_layer()).max(50.0);
     let size = map.size();
     let width = size.x as usize;
+    let noise = Octaves::new(1, f64::from(scale) / 4000.0, 31.0, size.max_element(), 4);
+    let mut unevenness = noise.reader();
     for (n, texel) in map.texels_mut().iter_mut().enumerate() {
         let place = (UVec2::new((n % width) as u32, (n / width) as u32).as_vec2() + 0.5) / size.as_vec2();
-        let lift = terrain.lift(place, reach);
-        let formed = smoothstep(0.6 * missing, 1.4 * missing, lift);
-        let dried = smoothstep(0.3 * missing, missing, -lift);
+        // Air is not equally moist everywhere.
+        let lift = terrain.lift(place, reach) + 80.0 * unevenness.at(place.to_array());
+        let formed = smoothstep(0.6 * missing, 0.6 * missing + 400.0, lift);
+        let dried = smoothstep(0.4 * missing + 80.0, 0.8 * missing + 300.0, -lift);
         let [coverage, height, base, free] = texel.map(f32::from);
         let coverage = coverage.max(255.0 * formed) * (1.0 - dried);
         *texel = [coverage, height, base * (1.0 - formed), free].map(|x| (x + 0.5) as u8);

@@ -88,7 +88,7 @@ impl Validate for Steering {
 /// How the height is computed at which rising air gets saturated.
 #[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub enum LclFormula {
-    /// 125 m for each kelvin between temperature and dew point (Espy 1836; Lawrence 2005, equation 24).
+    /// 125 m for each kelvin between temperature and dew point (Espy's rule of 1836; Lawrence 2005, equation 24).
     Espy,
     /// From the temperature at which it is saturated (Bolton 1980, equation 15), reached at the dry lapse rate. The default.
     #[default]
@@ -162,8 +162,8 @@ impl Steering {
         let layered = hints.stratiform / total;
         let steered = WeatherRecipe {
             cover: 8.0 * share,
-            // Thermals stand 1.5 depths of the mixed layer apart (Caughey and Palmer 1979); cells of stratocumulus lie
-            // closer than their layer is deep twice over (Agee 1987).
+            // Thermals stand 1.5 depths of the mixed layer apart (Caughey and Palmer 1979); cells of a closed layer are
+            // wider.
             cell_size: 1.5 * depth * (1.0 + 0.6 * layered),
             regularity: 0.2 + 0.65 * layered,
             streets: self.streets() * (1.0 - 0.5 * layered),
@@ -226,7 +226,7 @@ impl Steering {
     }
 
     /// Strength of streets (0..1): rolls form where −h/L, the mixed layer's depth over Obukhov's length, is below about 25,
-    /// and wind is above some 5.5 m/s (Weckwerth, Wilson and Wakimoto 1996; 1999). With no heat there are none.
+    /// and wind is above some 5.5 m/s (Weckwerth and others 1997). With no heat there are none.
     fn streets(&self) -> f32 {
         let flux = self.heat_flux() / HEAT_CAPACITY;
         if flux <= 0.0 {

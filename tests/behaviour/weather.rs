@@ -1,7 +1,13 @@
 //! Weather maps: made, converted, edited; and skies from reports and soundings.
 
 mod convert;
+mod edits;
 mod maps;
+#[cfg(feature = "metar")]
+mod metar;
+#[cfg(feature = "metar")]
+mod program;
+mod steering;
 
 use bevy_cumulus::prelude::*;
 

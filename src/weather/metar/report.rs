@@ -99,12 +99,15 @@ fn is_left_out(group: &str, before: &[(usize, String)]) -> bool {
     let runway = group.starts_with('R') && group.contains('/') && group[1..].starts_with(|c: char| c.is_ascii_digit());
     let directions = ["", "N", "NE", "E", "SE", "S", "SW", "W", "NW", "NDV"];
     let is_metres = |group: &str| group.split_at_checked(4).is_some_and(|(n, d)| digits(n) && directions.contains(&d));
-    let second = is_metres(group) && before.iter().skip(1).any(|(_, earlier)| is_metres(earlier));
+    let second = is_metres(group) && before.last().is_some_and(|(_, earlier)| is_metres(earlier));
     varying || runway || second || group == "//" || group == "$"
 }
 
-/// `P6SM`, more than 6 miles, and `M1/4SM`, less than a quarter: the number alone.
+/// `P6SM`, more than 6 miles, and `M1/4SM`, less than a quarter: the number alone. `20KM`: metres.
 fn plain_visibility(group: String) -> String {
+    if let Some(kilometres) = group.strip_suffix("KM").and_then(|number| number.parse::<u32>().ok()) {
+        return format!("{:04}", kilometres.saturating_mul(1000).min(9999));
+    }
     let bare = group.strip_suffix("SM").and_then(|_| group.strip_prefix(['P', 'M']));
     bare.filter(|bare| bare.starts_with(|c: char| c.is_ascii_digit())).map(str::to_owned).unwrap_or(group)
 }
