@@ -2,11 +2,12 @@
 
 use bevy::{
     asset::RenderAssetUsages,
-    image::ImageAddressMode,
+    image::{ImageAddressMode, ImageSampler, ImageType},
     prelude::*,
     render::render_resource::{Extent3d, TextureDimension, TextureFormat},
 };
 use bevy_cumulus::{prelude::*, weather::WeatherMapError};
+use image::{DynamicImage, GrayImage, ImageBuffer, ImageFormat, Rgba, Rgba32FImage, RgbaImage};
 
 use super::{made, small};
 
@@ -22,22 +23,10 @@ fn a_map_survives_as_an_image() {
     let image = map.to_image();
     assert_eq!(image.texture_descriptor.format, TextureFormat::Rgba8Unorm);
     assert_eq!(image.size(), map.size());
-    let sampler = image.sampler.get_or_init_descriptor_for_test();
-    assert!(sampler == (ImageAddressMode::Repeat, ImageAddressMode::Repeat));
+    let ImageSampler::Descriptor(sampler) = &image.sampler else { panic!("no sampler of its own") };
+    let modes = [sampler.address_mode_u, sampler.address_mode_v];
+    assert!(modes.iter().all(|mode| matches!(mode, ImageAddressMode::Repeat)));
     assert!(WeatherMap::from_image(&image).unwrap() == map);
-}
-
-trait SamplerModes {
-    fn get_or_init_descriptor_for_test(&self) -> (ImageAddressMode, ImageAddressMode);
-}
-
-impl SamplerModes for bevy::image::ImageSampler {
-    fn get_or_init_descriptor_for_test(&self) -> (ImageAddressMode, ImageAddressMode) {
-        match self {
-            Self::Descriptor(d) => (d.address_mode_u, d.address_mode_v),
-            Self::Default => panic!("no sampler of its own"),
-        }
-    }
 }
 
 fn shorts(values: &[u16]) -> Vec<u8> {
@@ -155,4 +144,55 @@ fn resizing_keeps_the_mean() {
         assert!((mean(&resized) - mean(&map)).abs() < 0.01, "{side}");
     }
     assert!(map.resized(map.size()).texels().iter().zip(map.texels()).all(|(a, b)| a[0].abs_diff(b[0]) <= 1));
+}
+
+/// Loads a file's bytes as Bevy's asset loader does.
+fn loaded(bytes: &[u8], extension: &str) -> Image {
+    let none = bevy::image::CompressedImageFormats::NONE;
+    let kind = ImageType::Extension(extension);
+    Image::from_buffer(bytes, kind, none, true, ImageSampler::Default, RenderAssetUsages::default())
+        .unwrap_or_else(|error| panic!("{extension}: {error}"))
+}
+
+fn encoded(picture: impl Into<DynamicImage>, format: ImageFormat) -> Vec<u8> {
+    let mut bytes = std::io::Cursor::new(Vec::new());
+    picture.into().write_to(&mut bytes, format).expect("encoded");
+    bytes.into_inner()
+}
+
+/// A KTX2 file of one `R8G8B8A8_UNORM` picture of 1 × 2 texels, not compressed.
+fn ktx2(texels: &[u8; 8]) -> Vec<u8> {
+    let mut bytes = b"\xabKTX 20\xbb\r\n\x1a\n".to_vec();
+    // Format, type size, width, height, depth, layers, faces, levels, supercompression; then where the empty description
+    // lies, and that there are neither keys nor global data.
+    for word in [37_u32, 1, 1, 2, 0, 0, 1, 1, 0, 104, 4, 0, 0] {
+        bytes.extend(word.to_le_bytes());
+    }
+    for word in [0_u64, 0, 108, 8, 8] {
+        bytes.extend(word.to_le_bytes());
+    }
+    bytes.extend(4_u32.to_le_bytes());
+    bytes.extend(texels);
+    bytes
+}
+
+#[test]
+fn files_become_maps() {
+    let map = |image: &Image| WeatherMap::from_image(image).unwrap_or_else(|error| panic!("{error}")).texels().to_vec();
+    let texels = [10, 20, 30, 255, 200, 100, 50, 255];
+    let expected = vec![[10, 20, 30, 255], [200, 100, 50, 255]];
+    let rgba = RgbaImage::from_raw(2, 1, texels.to_vec()).unwrap();
+    assert_eq!(map(&loaded(&encoded(rgba, ImageFormat::Png), "png")), expected, "PNG of 8 bits");
+    let long = texels.iter().map(|&b| u16::from(b) * 257).collect();
+    let long = ImageBuffer::<Rgba<u16>, _>::from_raw(2, 1, long).unwrap();
+    assert_eq!(map(&loaded(&encoded(long, ImageFormat::Png), "png")), expected, "PNG of 16 bits");
+    let grey = GrayImage::from_raw(2, 1, vec![7, 200]).unwrap();
+    let coverage = vec![[7, 255, 0, 255], [200, 255, 0, 255]];
+    assert_eq!(map(&loaded(&encoded(grey, ImageFormat::Png), "png")), coverage, "grey PNG");
+    assert_eq!(map(&loaded(&ktx2(&texels), "ktx2")), expected, "KTX2");
+    // Bevy's loader of EXR is a feature that this crate leaves to the app; what it hands on is this.
+    let real = texels.iter().map(|&b| f32::from(b) / 255.0).collect();
+    let exr = encoded(Rgba32FImage::from_raw(2, 1, real).unwrap(), ImageFormat::OpenExr);
+    let exr = image::load_from_memory(&exr).unwrap();
+    assert_eq!(map(&Image::from_dynamic(exr, false, RenderAssetUsages::default())), expected, "EXR");
 }
