@@ -104,17 +104,17 @@ fn layout(format: TextureFormat) -> Option<(Number, usize, bool)> {
     })
 }
 
-impl WeatherMap {
-    /// Takes a map from a picture, as Bevy loads PNG, KTX2 (not compressed), EXR or HDR files: the first mip level of one to
-    /// four channels of 8 or 16 bits, or of floats from 0 to 1.
-    ///
-    /// Numbers are taken as they were painted, whether or not the picture is marked as sRGB. Where height or base is missing,
-    /// cloud has full height and its base lies at the bottom; that holds too for a picture that is grey all over, which is
-    /// how Bevy loads grey PNGs.
-    ///
-    /// # Errors
-    /// What is wrong with the picture, with the place where it is.
-    pub fn from_image(image: &Image) -> Result<Self, WeatherMapError> {
+/// The texels of a picture that can be read.
+struct Picture<'a> {
+    size: UVec2,
+    data: &'a [u8],
+    number: Number,
+    channels: usize,
+    blue_first: bool,
+}
+
+impl<'a> Picture<'a> {
+    fn new(image: &'a Image) -> Result<Self, WeatherMapError> {
         let descriptor = &image.texture_descriptor;
         let (width, height) = (descriptor.size.width, descriptor.size.height);
         if descriptor.dimension != TextureDimension::D2 {
@@ -129,24 +129,56 @@ impl WeatherMap {
         let (number, channels, blue_first) =
             layout(descriptor.format).ok_or(WeatherMapError::Format(descriptor.format))?;
         let data = image.data.as_ref().ok_or(WeatherMapError::NoData)?;
-        let stride = number.bytes() * channels;
-        let needed = stride * width as usize * height as usize;
+        let needed = number.bytes() * channels * width as usize * height as usize;
         let data = data.get(..needed).ok_or(WeatherMapError::TooShort { needed, found: data.len() })?;
-        let mut texels = Vec::with_capacity(needed / stride);
-        for (n, bytes) in data.chunks_exact(stride).enumerate() {
+        Ok(Self { size: UVec2::new(width, height), data, number, channels, blue_first })
+    }
+
+    fn stride(&self) -> usize {
+        self.number.bytes() * self.channels
+    }
+
+    /// Channels that the picture lacks are as in a map of full height and the lowest base.
+    fn texels(&self) -> impl Iterator<Item = [f32; 4]> {
+        self.data.chunks_exact(self.stride()).map(|bytes| {
             let mut texel = [0.0, 1.0, 0.0, 1.0];
-            for (channel, bytes) in texel.iter_mut().zip(bytes.chunks_exact(number.bytes())) {
-                *channel = number.read(bytes);
+            for (channel, bytes) in texel.iter_mut().zip(bytes.chunks_exact(self.number.bytes())) {
+                *channel = self.number.read(bytes);
             }
-            if blue_first {
+            if self.blue_first {
                 texel.swap(0, 2);
             }
-            texels.push(to_bytes(texel, n, width)?);
+            texel
+        })
+    }
+}
+
+/// Size and red channel of a picture.
+pub(super) fn picture_channel(image: &Image) -> Result<(UVec2, Vec<f32>), WeatherMapError> {
+    let picture = Picture::new(image)?;
+    Ok((picture.size, picture.texels().map(|[red, ..]| red).collect()))
+}
+
+impl WeatherMap {
+    /// Takes a map from a picture, as Bevy loads PNG, KTX2 (not compressed), EXR or HDR files: the first mip level of one to
+    /// four channels of 8 or 16 bits, or of floats from 0 to 1.
+    ///
+    /// Numbers are taken as they were painted, whether or not the picture is marked as sRGB. Where height or base is missing,
+    /// cloud has full height and its base lies at the bottom; that holds too for a picture that is grey all over, which is
+    /// how Bevy loads grey PNGs.
+    ///
+    /// # Errors
+    /// What is wrong with the picture, with the place where it is.
+    pub fn from_image(image: &Image) -> Result<Self, WeatherMapError> {
+        let picture = Picture::new(image)?;
+        let mut texels = Vec::with_capacity(picture.data.len() / picture.stride());
+        for (n, texel) in picture.texels().enumerate() {
+            texels.push(to_bytes(texel, n, picture.size.x)?);
         }
-        if channels > 2 && texels.iter().all(|[r, g, b, _]| r == g && g == b) {
+        if picture.channels > 2 && texels.iter().all(|[r, g, b, _]| r == g && g == b) {
             texels.iter_mut().for_each(|texel| *texel = [texel[0], 255, 0, 255]);
         }
-        Ok(Self::from_texels(UVec2::new(width, height), texels))
+        Ok(Self::from_texels(picture.size, texels))
     }
 }
 

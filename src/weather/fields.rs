@@ -1,7 +1,7 @@
 //! Where a recipe's clouds gather, before the cover decides how many of them there are.
 
 use super::{
-    lattice::{Lattice, wave_vector},
+    lattice::{Lattice, sin_cos, wave_vector},
     noise::{Cellular, Fractal, Octaves, hash, smoothstep, wave},
     recipe::WeatherRecipe,
 };
@@ -99,7 +99,7 @@ impl<'a> Fields<'a> {
                 along(Stream::RippleBreaks, waves / 1.6, waves / 4.0, ripple_turn, 3),
             ),
             streaks: (
-                noise(Stream::StreakBend, r.streak_length * 1.3, 2),
+                noise(Stream::StreakBend, r.streak_length * 0.6, 3),
                 along(Stream::Streaks, length, fibres, streak_turn, 4),
             ),
             height: noise(Stream::Height, r.height_size, 3),
@@ -132,13 +132,13 @@ impl<'a> Fields<'a> {
 
 /// Of the directions whose line closes on itself after few repeats, the nearest.
 fn front_vector(degrees: f64) -> [i32; 2] {
-    let [[x, y], [_, _]] = [wave_vector(1e4, degrees), [0, 0]].map(|v| v.map(f64::from));
-    let short = [[1, 0], [0, 1], [1, 1], [1, -1], [2, 1], [1, 2], [2, -1], [1, -2]];
-    let all = short.iter().flat_map(|&[a, b]| [[a, b], [-a, -b]]);
+    let (sin, cos) = sin_cos(degrees);
     let cosine = |[a, b]: [i32; 2]| {
         let (a, b) = (f64::from(a), f64::from(b));
-        (a * x + b * y) / (a * a + b * b).sqrt()
+        (a * cos + b * sin) / (a * a + b * b).sqrt()
     };
+    let half = [[1, 0], [2, 1], [1, 1], [1, 2], [0, 1], [-1, 2], [-1, 1], [-2, 1]];
+    let all = half.iter().flat_map(|&[a, b]| [[a, b], [-a, -b]]);
     all.fold([1, 0], |best, next| if cosine(next) > cosine(best) + 1e-6 { next } else { best })
 }
 
@@ -198,7 +198,7 @@ impl Row<'_> {
             tall += r.front * 0.8 * band;
         }
         let regional = if r.height_variation > 0.0 { 0.5 + 0.7 * self.height.at(place) } else { 0.0 };
-        let height = (0.55 * tall + 0.55 * regional).clamp(0.0, 1.0);
+        let height = (0.85 * tall + 0.5 * (regional - 0.4)).clamp(0.0, 1.0);
         let base = if r.base_variation > 0.0 { (0.5 + 0.6 * self.base.at(place)).clamp(0.0, 1.0) } else { 0.0 };
         Texel { potential, height, base }
     }
@@ -221,8 +221,9 @@ impl Row<'_> {
         // Walls of open cells swell where they meet and have gaps.
         let open = wall * (0.4 + 0.8 * large.growth);
         let body = closed + (open - closed) * r.open_cells;
-        let edge = 0.35 * (small.bump - 0.5) + 0.3 * self.shreds.at(place);
-        let growth = large.growth * (0.35 + 0.65 * large.bump);
+        let edge = 0.4 * (small.bump - 0.5) + 0.45 * self.shreds.at(place);
+        // A dome over each cell, the larger the higher.
+        let growth = 0.15 + 0.85 * body * (0.5 + 0.5 * large.growth);
         (2.0 * body - 1.0 + 1.2 * r.raggedness * edge, growth)
     }
 
@@ -230,7 +231,7 @@ impl Row<'_> {
     fn streets(&mut self, place: [f32; 2]) -> f32 {
         let (waves, bend, breaks) = &mut self.streets;
         let turns = phase(*waves, place) + 0.22 * bend.at(place);
-        0.95 * wave(turns) + 0.9 * breaks.at(place)
+        0.95 * wave(turns) + 1.1 * breaks.at(place)
     }
 
     /// Rolls, here long and there broken into grains.
@@ -249,9 +250,9 @@ impl Row<'_> {
         let r = self.recipe;
         let (bend, fibres) = &mut self.streaks;
         let bent = bend.at(place);
-        let reach = 0.1 * r.streak_length / r.scale * bent;
+        let reach = 0.035 * r.streak_length / r.scale * bent;
         let there = [place[0] + reach, place[1] - reach];
-        1.3 * fibres.at(there) + 0.9 * bent
+        1.4 * fibres.at(there) + 0.45 * bent
     }
 
     /// 1 in the middle of a clearing, 0 outside.

@@ -12,7 +12,7 @@ use crate::settings::{SettingsError, Validate};
 /// `scale`, the coarser its steps.
 ///
 /// Costs are of `size` alone: 512² texels take about 0.1 s of one processor core, optimised, and four times as many four
-/// times as long. Where a control is 0, what it adds is not computed.
+/// times as long. What a control adds is not computed where it is 0.
 #[derive(Reflect, Serialize, Deserialize, Clone, PartialEq, Debug)]
 #[reflect(Default, Serialize, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
@@ -68,8 +68,8 @@ pub struct WeatherRecipe {
     /// Where the front crosses the map, in repeats (0..1). Default 0.5.
     #[reflect(@0.0..=1.0_f32)]
     pub front_position: f32,
-    /// Direction that the front moves in, at a right angle to its line (degrees); rounded to the nearest of twelve that close
-    /// on themselves. Default 0.
+    /// Direction that the front moves in, at a right angle to its line (degrees); rounded to the nearest of sixteen whose lines
+    /// close on themselves. Default 0.
     #[reflect(@-360.0..=360.0_f32)]
     pub front_direction: f32,
     /// Width of the front's band (m); at most a quarter of a repeat. Default 6000.

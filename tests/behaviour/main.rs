@@ -32,6 +32,7 @@ mod textures;
 mod transparent;
 mod twins;
 mod view;
+mod weather;
 mod window;
 #[cfg(target_os = "linux")]
 mod window_driven;
