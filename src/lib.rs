@@ -19,7 +19,7 @@
 //! settings (resources)  ->  textures (baked on the GPU or loaded as assets)  ->  model: "what is at p?"
 //!                                                                                  |  one shader interface
 //!    per camera:      sky light -> march -> accumulate -> composite   <------------+
-//!                     (after the opaque scene and sky, before tone mapping)
+//!                     (after the opaque scene) -> drawn among transparent things, or over them
 //! ```
 //!
 //! | plugin | what it adds |
@@ -35,6 +35,7 @@
 #[cfg(feature = "inspector")]
 pub mod inspector;
 mod model;
+pub mod phases;
 pub mod reference;
 mod render;
 pub mod settings;
@@ -52,24 +53,25 @@ use bevy::{
 };
 
 pub use model::ModelShader;
+pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
 pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
 };
-pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
+pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
-    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
-    CloudTextures, CloudView,
+    CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
+    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, ModelPhases,
 };
 
 /// What most users need.
 pub mod prelude {
     pub use crate::{
-        CloudBuffer, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
+        CloudBuffer, CloudDepth, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
-            CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
-            PhaseFunction, TemporalMode, UpscaleBlock,
+            CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudMethod, CloudModel, CloudOrder,
+            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion,
+            Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
         },
         weather::{WeatherMap, WeatherRecipe},
     };
@@ -93,6 +95,7 @@ impl Plugin for CloudsPlugin {
             settings::CloudSettingsPlugin,
             textures::CloudTexturesPlugin,
             model::CloudModelPlugin,
+            phases::CloudPhasesPlugin,
             render::CloudRenderPlugin,
         ));
     }
@@ -126,7 +129,7 @@ fn missing_capability(world: &World) -> Option<String> {
     let limits = device.limits();
     for (what, has, needs) in [
         ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 3),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 1),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 2),
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 128),
         ("max_bind_groups", limits.max_bind_groups, 3),
     ] {
@@ -134,13 +137,9 @@ fn missing_capability(world: &World) -> Option<String> {
             return Some(format!("{name}: {what} is {has}, and clouds need {needs}"));
         }
     }
-    for format in [
-        TextureFormat::Rgba8Unorm,
-        TextureFormat::Rgba16Float,
-        TextureFormat::Rgba32Float,
-        TextureFormat::Rg32Float,
-        TextureFormat::R32Uint,
-    ] {
+    for format in
+        [TextureFormat::Rgba8Unorm, TextureFormat::Rgba16Float, TextureFormat::Rgba32Float, TextureFormat::R32Uint]
+    {
         if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {
             return Some(format!("{name}: {format:?} cannot be a storage texture"));
         }

@@ -15,12 +15,16 @@ pub mod metar;
 mod noise;
 mod orographic;
 mod patterns;
+mod pyramid;
 mod recipe;
 mod steering;
+mod swirl;
 
 pub use convert::WeatherMapError;
 pub use edit::StormCell;
 pub use map::WeatherMap;
 pub use orographic::{Terrain, TerrainError, orographic};
+pub(crate) use pyramid::WeatherPyramid;
 pub use recipe::WeatherRecipe;
 pub use steering::{LayerHints, LclFormula, Steering, lifting_condensation_level, relative_humidity, stratiform_cover};
+pub(crate) use swirl::{SWIRL_SIZE, Swirl};
