@@ -35,10 +35,12 @@
 #[cfg(feature = "inspector")]
 pub mod inspector;
 mod model;
+pub mod phases;
 pub mod reference;
 mod render;
 pub mod settings;
 pub mod textures;
+pub mod weather;
 
 use bevy::{
     prelude::*,
@@ -51,14 +53,15 @@ use bevy::{
 };
 
 pub use model::ModelShader;
+pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
 pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
 };
 pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
-    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudOrder, CloudPreset, CloudQuality, CloudSettings,
-    CloudTextureSlots, CloudTextures, CloudView,
+    CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
+    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, ModelPhases,
 };
 
 /// What most users need.
@@ -66,10 +69,11 @@ pub mod prelude {
     pub use crate::{
         CloudBuffer, CloudDepth, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudOrder, CloudPreset, CloudQuality,
-            CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
-            PhaseFunction, TemporalMode, UpscaleBlock,
+            CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudMethod, CloudModel, CloudOrder,
+            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion,
+            Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
         },
+        weather::{WeatherMap, WeatherRecipe},
     };
 }
 
@@ -91,6 +95,7 @@ impl Plugin for CloudsPlugin {
             settings::CloudSettingsPlugin,
             textures::CloudTexturesPlugin,
             model::CloudModelPlugin,
+            phases::CloudPhasesPlugin,
             render::CloudRenderPlugin,
         ));
     }
@@ -124,7 +129,7 @@ fn missing_capability(world: &World) -> Option<String> {
     let limits = device.limits();
     for (what, has, needs) in [
         ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 3),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 1),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 2),
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 128),
         ("max_bind_groups", limits.max_bind_groups, 3),
     ] {

@@ -22,7 +22,7 @@ use bevy::{
     window::ExitCondition,
     winit::WinitPlugin,
 };
-use bevy_cumulus::{CloudBuffer, CloudNoise, CloudStatus, prelude::*, textures::CloudTextureStatus};
+use bevy_cumulus::{CloudBuffer, CloudNoise, CloudPhaseStatus, CloudStatus, prelude::*, textures::CloudTextureStatus};
 use image::{RgbImage, Rgba32FImage};
 
 use crate::{
@@ -227,7 +227,7 @@ impl Studio {
             if let Some(reason) = status.unsupported() {
                 bail!("clouds cannot be drawn on this device: {reason}");
             }
-            let drawn = status.is_ready();
+            let drawn = status.is_ready() && !world.resource::<CloudPhaseStatus>().computing;
             stage.at((world.resource::<CloudTextureStatus>().progress * 100.0) as u64);
             let made = self.pipelines_made()?;
             settled = if drawn && made { settled + 1 } else { 0 };
@@ -365,6 +365,7 @@ impl Studio {
 fn set(world: &mut World, settings: &CloudSettings) {
     let settings = settings.clone();
     world.insert_resource(settings.model);
+    world.insert_resource(settings.layers);
     world.insert_resource(settings.lighting);
     world.insert_resource(settings.quality);
     world.insert_resource(settings.textures);

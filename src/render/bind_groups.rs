@@ -21,6 +21,7 @@ use bevy::{
 use super::{
     StatusFlags,
     history::CloudHistory,
+    phase_slots::PhaseTableBuffer,
     pipelines::{CloudPipelines, SKY_LIGHT_BYTES, Variant},
     view::{CloudUniforms, ExtractedCloudView},
 };
@@ -113,12 +114,14 @@ pub(crate) fn prepare_bind_groups(
     textures: Res<CloudTextureViews>,
     images: Res<RenderAssets<GpuImage>>,
     model: Res<ModelBindings>,
+    phase_tables: Res<PhaseTableBuffer>,
     mut pipelines: ResMut<CloudPipelines>,
     cache: Res<PipelineCache>,
     device: Res<RenderDevice>,
     status: Res<StatusFlags>,
 ) {
-    let mut ready = !views.is_empty();
+    // What layers read comes after what the thesis's layer does.
+    let mut ready = !views.is_empty() && !textures.maps_pending && !(textures.bake_pending && textures.shape.is_none());
     for item in &views {
         let own;
         let sky_light = match item.sky_light {
@@ -141,6 +144,7 @@ pub(crate) fn prepare_bind_groups(
             &textures,
             &images,
             &model,
+            &phase_tables.buffer,
             &mut pipelines,
             &cache,
             &device,
@@ -166,6 +170,7 @@ fn view_bind_groups(
     textures: &CloudTextureViews,
     images: &RenderAssets<GpuImage>,
     model: &ModelBindings,
+    phase_tables: &Buffer,
     pipelines: &mut CloudPipelines,
     cache: &PipelineCache,
     device: &RenderDevice,
@@ -248,6 +253,7 @@ fn view_bind_groups(
                         history.marched_before(),
                         history.marched_now(),
                         held.clone(),
+                        phase_tables.as_entire_binding(),
                     )),
                 ),
             ),
@@ -255,15 +261,16 @@ fn view_bind_groups(
         },
         Some([trace, noise]) => {
             let [before, after] = history.moments()?;
-            let entries = BindGroupEntries::sequential((
-                frame.clone(),
-                history.sum_before(),
-                before,
-                depth,
-                history.sum_after(),
-                &history.distances,
-                world_from_local.clone(),
-                after,
+            let entries = BindGroupEntries::with_indices((
+                (0, frame.clone()),
+                (1, history.sum_before()),
+                (2, before),
+                (3, depth),
+                (4, history.sum_after()),
+                (5, &history.distances),
+                (6, world_from_local.clone()),
+                (7, after),
+                (10, phase_tables.as_entire_binding()),
             ));
             let image = item.cloud.noise.and_then(|id| images.get(id));
             Light::PathTrace {

@@ -6,6 +6,7 @@ mod frame;
 pub(crate) mod history;
 mod order;
 mod passes;
+pub(crate) mod phase_slots;
 mod pipelines;
 mod reproject;
 mod status;
@@ -30,6 +31,7 @@ use crate::model::ModelBindings;
 
 pub use buffer::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise};
 pub(crate) use frame::FrameUniform;
+pub(crate) use phase_slots::{PHASE_SLOTS, phase_tables_layout};
 pub(crate) use pipelines::depth_layout;
 pub use status::CloudStatus;
 pub(crate) use status::StatusFlags;
@@ -41,6 +43,7 @@ impl Plugin for CloudRenderPlugin {
     fn build(&self, app: &mut App) {
         load_shader_library!(app, "frame.wesl");
         load_shader_library!(app, "march/phase.wesl");
+        load_shader_library!(app, "march/table.wesl");
         load_shader_library!(app, "march/integrate.wesl");
         load_shader_library!(app, "march/lighting.wesl");
         load_shader_library!(app, "march/aerial.wesl");
@@ -77,6 +80,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
         .add_render_command::<Transparent3d, order::DrawClouds>()
         .init_gpu_resource::<ModelBindings>()
         .init_gpu_resource::<pipelines::CloudPipelines>()
+        .init_gpu_resource::<phase_slots::PhaseTableBuffer>()
         .add_systems(RenderStartup, view::forget_lost_device)
         .add_systems(ExtractSchedule, (view::extract_settings, view::extract_views))
         .add_systems(
@@ -91,6 +95,7 @@ pub(crate) fn build_render(render_app: &mut SubApp) {
                     .chain()
                     .after(crate::textures::TextureSwaps)
                     .in_set(RenderSystems::PrepareResources),
+                phase_slots::write_phase_tables.in_set(RenderSystems::PrepareResources),
                 bind_groups::prepare_bind_groups.in_set(RenderSystems::PrepareBindGroups),
                 order::sort_in.after(sort_phase_system::<Transparent3d>).in_set(RenderSystems::PhaseSort),
             ),

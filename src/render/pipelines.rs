@@ -14,7 +14,7 @@ use bevy::{
     render::render_resource::{binding_types::*, *},
 };
 
-use super::{frame::FrameUniform, reproject::HeldUniform};
+use super::{frame::FrameUniform, phase_slots::phase_tables_layout, reproject::HeldUniform};
 use crate::{model::ModelBindings, reference::path_tracer::PathTracer, settings::DebugShader};
 
 /// What clouds are drawn into.
@@ -117,6 +117,7 @@ impl FromWorld for CloudPipelines {
                         texture_2d(TextureSampleType::Uint),
                         write(TextureFormat::R32Uint),
                         uniform_buffer::<HeldUniform>(false),
+                        phase_tables_layout(),
                     ),
                 ),
             )

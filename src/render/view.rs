@@ -20,15 +20,17 @@ use super::{
     bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey},
+    phase_slots::PhaseSlots,
     pipelines::DrawnInto,
     reproject::{HeldUniform, Pose},
 };
 use crate::{
-    model::{ModelUniform, TangentFrame, TexelSizes},
+    model::{ModelSettings, ModelUniform, TangentFrame, TexelSizes},
+    phases::ReadyTables,
     reference::planet::PLANET_RADIUS,
     settings::{
-        CloudDebugView, CloudLighting, CloudModel, CloudOrder, CloudQuality, CloudSettings, CloudView, GoodSettings,
-        Validate,
+        CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase, CloudQuality, CloudSettings,
+        CloudView, GoodPhases, GoodSettings, Validate,
     },
     textures::CloudTextureViews,
 };
@@ -37,6 +39,9 @@ use crate::{
 #[derive(Resource, Default)]
 pub(crate) struct ExtractedClouds {
     pub settings: CloudSettings,
+    /// Phase functions beside the lighting's own.
+    phases: Vec<CloudPhase>,
+    pub(super) tables: ReadyTables,
     /// Counts changes that make held frames wrong.
     version: u64,
 }
@@ -97,12 +102,22 @@ pub(crate) fn forget_lost_device(mut commands: Commands, views: Query<Entity, Wi
     }
 }
 
-pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut<ExtractedClouds>) {
+pub(crate) fn extract_settings(
+    good: Extract<Res<GoodSettings>>,
+    phases: Extract<Res<GoodPhases>>,
+    tables: Extract<Res<ReadyTables>>,
+    mut out: ResMut<ExtractedClouds>,
+) {
     // Time and a shifted origin move what is seen; frames held are moved along.
     out.settings.clock.clone_from(&good.0.clock);
     out.settings.model.world_offset = good.0.model.world_offset;
-    if out.settings != good.0 {
+    if out.settings != good.0 || out.phases != phases.0 {
         out.settings.clone_from(&good.0);
+        out.phases.clone_from(&phases.0);
+        out.version += 1;
+    }
+    if out.tables.generation != tables.generation {
+        out.tables.clone_from(&tables);
         out.version += 1;
     }
 }
@@ -242,7 +257,8 @@ pub(crate) fn prepare_views(
             None => first.insert(CloudHistory::new(&device, key, pose)),
         };
         let (window, held) = (history.frame, history.held_uniform());
-        let (model, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
+        let (model, layers, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
+        let phases = PhaseSlots::new(&lighting, &clouds.phases, &clouds.tables);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
             world_from_view: pose.rotation,
@@ -252,10 +268,16 @@ pub(crate) fn prepare_views(
             exposure: item.camera.exposure,
             quality: &item.cloud.quality,
             lighting: &lighting,
+            phases: &phases,
             window,
             debug: item.cloud.debug,
         });
-        let model = ModelUniform::new(&model, clouds.settings.clock.seconds, &space, sizes);
+        let model = ModelUniform::new(
+            &ModelSettings { model: &model, layers: &layers, zones: &[] },
+            clouds.settings.clock.seconds,
+            &space,
+            sizes,
+        );
         let world_from_local = Mat4::from_quat(space.local_from_world.inverse().as_quat());
         let mut own = None;
         let uniforms = match &mut item.uniforms {
@@ -281,11 +303,11 @@ pub(crate) fn prepare_views(
 }
 
 /// The settings with a debug view's changes made to them.
-fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLighting) {
+fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLayers, CloudLighting) {
     let (mut model, mut lighting) = (settings.model.clone(), settings.lighting.clone());
     debug.change_model(&mut model);
     debug.change_lighting(&mut lighting);
-    (model, lighting)
+    (model, settings.layers.clone(), lighting)
 }
 
 /// Centre (world space plus offset, m) and radius (m): those of the scene's atmosphere, else a radius below the world's

@@ -2,9 +2,11 @@
 
 mod check;
 mod debug;
+mod layers;
 mod lighting;
 mod model;
 mod paths;
+mod phase;
 mod preset;
 mod quality;
 mod textures;
@@ -15,9 +17,12 @@ use bevy::prelude::*;
 pub use check::{SettingsError, Validate};
 pub use debug::CloudDebugView;
 pub(crate) use debug::DebugShader;
-pub use lighting::{CloudLighting, PhaseFunction};
+pub use layers::{CloudLayer, CloudLayers, LayerKind, MAX_LAYERS, MapChannels};
+pub use lighting::CloudLighting;
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
+pub(crate) use phase::GoodPhases;
+pub use phase::{CloudPhase, ModelPhases, PhaseFunction};
 pub use preset::{CloudPreset, PresetError};
 pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
@@ -37,13 +42,17 @@ pub(crate) struct CloudSettingsPlugin;
 impl Plugin for CloudSettingsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CloudModel>()
+            .init_resource::<CloudLayers>()
             .init_resource::<CloudLighting>()
             .init_resource::<CloudQuality>()
             .init_resource::<CloudTextures>()
             .init_resource::<CloudTextureSlots>()
             .init_resource::<CloudClock>()
             .init_resource::<GoodSettings>()
+            .init_resource::<ModelPhases>()
+            .init_resource::<GoodPhases>()
             .register_type::<CloudModel>()
+            .register_type::<CloudLayers>()
             .register_type::<CloudLighting>()
             .register_type::<CloudQuality>()
             .register_type::<CloudTextures>()
@@ -53,6 +62,8 @@ impl Plugin for CloudSettingsPlugin {
             .register_type::<CloudOrder>()
             .register_type::<CloudDebugView>()
             .register_type::<CloudPreset>()
+            .register_type::<CloudPhase>()
+            .register_type::<ModelPhases>()
             .init_asset::<CloudPreset>()
             .init_asset_loader::<preset::CloudPresetLoader>()
             .add_systems(
@@ -66,10 +77,12 @@ impl Plugin for CloudSettingsPlugin {
                 Last,
                 (
                     keep_good::<CloudModel>,
+                    keep_good::<CloudLayers>,
                     keep_good::<CloudLighting>,
                     keep_good::<CloudQuality>,
                     keep_good::<CloudTextures>,
                     keep_good::<CloudClock>,
+                    phase::keep_good_phases,
                 )
                     .chain()
                     .in_set(KeepGood),
@@ -89,7 +102,7 @@ macro_rules! kept {
         })*
     };
 }
-kept!(CloudModel => model, CloudLighting => lighting, CloudQuality => quality,
+kept!(CloudModel => model, CloudLayers => layers, CloudLighting => lighting, CloudQuality => quality,
       CloudTextures => textures, CloudClock => clock);
 
 fn keep_good<S: Kept>(setting: Option<Res<S>>, mut good: ResMut<GoodSettings>, mut reported: Local<Option<String>>) {

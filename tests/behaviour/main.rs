@@ -18,6 +18,8 @@ mod many_cameras;
 mod motion;
 mod occlusion;
 mod path_tracer;
+mod phase_slots;
+mod phase_tables;
 mod phases;
 mod sampling_patterns;
 mod schedule;
@@ -30,6 +32,7 @@ mod textures;
 mod transparent;
 mod twins;
 mod view;
+mod weather;
 mod window;
 #[cfg(target_os = "linux")]
 mod window_driven;

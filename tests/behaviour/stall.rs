@@ -14,7 +14,7 @@ use crate::{
 };
 
 /// What fields are set to, where it is of their type and in their range.
-const VALUES: [&str; 28] = [
+const VALUES: [&str; 34] = [
     "10",
     "0.03",
     "0.05",
@@ -33,7 +33,13 @@ const VALUES: [&str; 28] = [
     "1,2,3",
     "0.5,0.6,0.7",
     "isotropic",
+    "rayleigh",
+    "cornette_shanks",
+    "schlick",
     "two_lobe",
+    "mie",
+    "ice",
+    "table",
     "subtract",
     "full",
     "quarter",
@@ -70,6 +76,7 @@ fn no_setting_compiles_anything_or_takes_the_clouds_away() {
     let world = app.world();
     let start = CloudSettings {
         model: world.resource::<CloudModel>().clone(),
+        layers: world.resource::<CloudLayers>().clone(),
         lighting: world.resource::<CloudLighting>().clone(),
         quality: world.resource::<CloudQuality>().clone(),
         textures: world.resource::<CloudTextures>().clone(),
@@ -92,6 +99,7 @@ fn no_setting_compiles_anything_or_takes_the_clouds_away() {
             }
             tried += 1;
             app.insert_resource(settings.model)
+                .insert_resource(settings.layers)
                 .insert_resource(settings.lighting)
                 .insert_resource(settings.quality)
                 .insert_resource(settings.textures)
