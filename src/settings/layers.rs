@@ -254,6 +254,15 @@ impl CloudLayers {
         self.0.iter().enumerate().filter(|(_, layer)| layer.enabled).take(MAX_LAYERS)
     }
 
+    /// Distance from the ground to where the bases of high layers pass below the horizon (m); 0 without any. Cirrus is seen
+    /// much farther than cumulus, and few long steps show it.
+    pub(crate) fn highest_horizon(&self, radius: f64) -> f32 {
+        /// Lower layers end at `quality.max_distance` (m).
+        const HIGH: f32 = 2500.0;
+        let bases = self.shown().map(|(_, layer)| layer.base).filter(|base| *base > HIGH);
+        bases.map(|base| (2.0 * radius * f64::from(base)).sqrt() as f32).fold(0.0, f32::max)
+    }
+
     /// The different phase functions of layers that have their own: slots 1 to 3.
     pub(crate) fn phases(&self) -> Vec<CloudPhase> {
         let mut phases = Vec::new();
