@@ -19,7 +19,8 @@ pub const EFFECTIVE_VARIANCE: f64 = 0.05;
 const SIZE_STEP: f64 = 0.45;
 const LARGE: f64 = 120.0;
 
-/// Refractive index of water at a wavelength (µm, 0.18 to 1.1): Daimon and Masumura (2007), 21.5 °C.
+/// Refractive index of water in air at a wavelength (µm, 0.18 to 1.1): Daimon and Masumura (2007), 21.5 °C, theirs in
+/// vacuum.
 pub fn water_index(wavelength: f64) -> f64 {
     const TERMS: [[f64; 2]; 4] = [
         [5.689093832e-1, 5.110301794e-3],
@@ -27,8 +28,9 @@ pub fn water_index(wavelength: f64) -> f64 {
         [2.062501582e-2, 2.624158904e-2],
         [1.123965424e-1, 1.067505178e1],
     ];
+    const AIR: f64 = 1.00027;
     let square = wavelength * wavelength;
-    (1.0 + TERMS.iter().map(|[strength, pole]| strength * square / (square - pole)).sum::<f64>()).sqrt()
+    (1.0 + TERMS.iter().map(|[strength, pole]| strength * square / (square - pole)).sum::<f64>()).sqrt() / AIR
 }
 
 /// A sphere of size x = 2πr/λ and real refractive index m.
