@@ -19,7 +19,7 @@
 //! settings (resources)  ->  textures (baked on the GPU or loaded as assets)  ->  model: "what is at p?"
 //!                                                                                  |  one shader interface
 //!    per camera:      sky light -> march -> accumulate -> composite   <------------+
-//!                     (after the opaque scene and sky, before tone mapping)
+//!                     (after the opaque scene) -> drawn among transparent things, or over them
 //! ```
 //!
 //! | plugin | what it adds |
@@ -41,6 +41,7 @@ pub mod reference;
 mod render;
 pub mod settings;
 pub mod textures;
+pub mod weather;
 
 use bevy::{
     prelude::*,
@@ -58,21 +59,22 @@ pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
 };
-pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
+pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
-    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPhase, CloudPreset, CloudQuality, CloudSettings,
-    CloudTextureSlots, CloudTextures, CloudView, ModelPhases,
+    CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
+    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, ModelPhases,
 };
 
 /// What most users need.
 pub mod prelude {
     pub use crate::{
-        CloudBuffer, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
+        CloudBuffer, CloudDepth, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPhase, CloudPreset, CloudQuality,
-            CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
-            PhaseFunction, TemporalMode, UpscaleBlock,
+            CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudMethod, CloudModel, CloudOrder,
+            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion,
+            Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
         },
+        weather::{WeatherMap, WeatherRecipe},
     };
 }
 
@@ -136,13 +138,9 @@ fn missing_capability(world: &World) -> Option<String> {
             return Some(format!("{name}: {what} is {has}, and clouds need {needs}"));
         }
     }
-    for format in [
-        TextureFormat::Rgba8Unorm,
-        TextureFormat::Rgba16Float,
-        TextureFormat::Rgba32Float,
-        TextureFormat::Rg32Float,
-        TextureFormat::R32Uint,
-    ] {
+    for format in
+        [TextureFormat::Rgba8Unorm, TextureFormat::Rgba16Float, TextureFormat::Rgba32Float, TextureFormat::R32Uint]
+    {
         if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {
             return Some(format!("{name}: {format:?} cannot be a storage texture"));
         }

@@ -365,6 +365,7 @@ impl Studio {
 fn set(world: &mut World, settings: &CloudSettings) {
     let settings = settings.clone();
     world.insert_resource(settings.model);
+    world.insert_resource(settings.layers);
     world.insert_resource(settings.lighting);
     world.insert_resource(settings.quality);
     world.insert_resource(settings.textures);

@@ -12,7 +12,7 @@ use bevy_egui::egui::{self, Color32, TextEdit, Ui};
 
 use super::fields::plain_docs;
 use crate::{
-    settings::{CloudLighting, CloudModel, CloudPreset, CloudTextureSlots, CloudTextures, Validate},
+    settings::{CloudLayers, CloudLighting, CloudModel, CloudPreset, CloudTextureSlots, CloudTextures, Validate},
     textures::CloudTextureError,
 };
 
@@ -96,7 +96,7 @@ impl PresetState {
 
 /// Whether the presets make the same sky; the sun is the scene's.
 fn is_same(a: &CloudPreset, b: &CloudPreset) -> bool {
-    a.model == b.model && a.lighting == b.lighting && a.textures == b.textures
+    a.model == b.model && a.layers == b.layers && a.lighting == b.lighting && a.textures == b.textures
 }
 
 /// Writes a preset that can be read again.
@@ -105,6 +105,7 @@ fn write(preset: &CloudPreset, path: &str) -> Result<(), String> {
         return Err(format!("the name of a preset file must end in {EXTENSION}"));
     }
     preset.model.validate().map_err(|error| error.to_string())?;
+    preset.layers.validate().map_err(|error| error.to_string())?;
     preset.lighting.validate().map_err(|error| error.to_string())?;
     preset.textures.validate().map_err(|error| error.to_string())?;
     let text = preset.to_ron();
@@ -126,6 +127,7 @@ fn sun_advice(preset: &CloudPreset) -> String {
 /// The preset that the settings and the scene's brightest light amount to.
 pub(super) fn current<'a>(
     model: &CloudModel,
+    layers: &CloudLayers,
     lighting: &CloudLighting,
     textures: &CloudTextures,
     lights: impl Iterator<Item = (&'a DirectionalLight, &'a GlobalTransform)>,
@@ -133,6 +135,7 @@ pub(super) fn current<'a>(
     let sun = lights.max_by(|(a, _), (b, _)| a.illuminance.total_cmp(&b.illuminance));
     CloudPreset {
         model: model.clone(),
+        layers: layers.clone(),
         lighting: lighting.clone(),
         textures: textures.clone(),
         sun_elevation: sun.map(|(_, place)| elevation(place)),

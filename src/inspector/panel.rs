@@ -19,8 +19,8 @@ use super::{
 use crate::{
     CloudStatus,
     settings::{
-        CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudQuality, CloudTextureSlots, CloudTextures,
-        CloudView, SettingsError, Validate,
+        CloudClock, CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudQuality, CloudTextureSlots,
+        CloudTextures, CloudView, SettingsError, Validate,
     },
     textures::{CloudTextureError, CloudTextureStatus},
 };
@@ -32,6 +32,7 @@ pub(super) struct Shown<'w, 's> {
     lights: Query<'w, 's, (&'static DirectionalLight, &'static GlobalTransform)>,
     chosen: MessageWriter<'w, CloudPresetChosen>,
     model: Option<ResMut<'w, CloudModel>>,
+    layers: Option<ResMut<'w, CloudLayers>>,
     lighting: Option<ResMut<'w, CloudLighting>>,
     quality: Option<ResMut<'w, CloudQuality>>,
     textures: Option<ResMut<'w, CloudTextures>>,
@@ -109,13 +110,15 @@ fn part(ui: &mut Ui, title: &str, open: bool, contents: impl FnOnce(&mut Ui)) {
 }
 
 fn presets_ui(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {
-    let (Some(model), Some(lighting), Some(textures)) = (&mut shown.model, &mut shown.lighting, &mut shown.textures)
+    let (Some(model), Some(layers), Some(lighting), Some(textures)) =
+        (&mut shown.model, &mut shown.layers, &mut shown.lighting, &mut shown.textures)
     else {
         ui.label("there is no CloudsPlugin");
         return;
     };
-    if let Some(preset) = state.presets.ui(ui, &current(model, lighting, textures, shown.lights.iter())) {
+    if let Some(preset) = state.presets.ui(ui, &current(model, layers, lighting, textures, shown.lights.iter())) {
         model.set_if_neq(preset.model.clone());
+        layers.set_if_neq(preset.layers.clone());
         lighting.set_if_neq(preset.lighting.clone());
         textures.set_if_neq(preset.textures.clone());
         shown.chosen.write(CloudPresetChosen(preset));

@@ -4,6 +4,7 @@
 //! that `medium.wesl` documents. The built-in one is the thesis's profile maps; [`ModelShader`] replaces it.
 
 mod bindings;
+mod layers;
 mod probe;
 mod space;
 mod uniform;
@@ -12,7 +13,7 @@ use bevy::{prelude::*, shader::load_shader_library};
 
 pub(crate) use bindings::ModelBindings;
 pub(crate) use space::TangentFrame;
-pub(crate) use uniform::{ModelUniform, TexelSizes};
+pub(crate) use uniform::{ModelSettings, ModelUniform, TexelSizes};
 
 /// Path whose module path is the model's: a shader registered under it takes the built-in one's place.
 const MODEL_PATH: &str = "embedded://bevy_cumulus/model/model.wesl";
@@ -35,6 +36,10 @@ impl Plugin for CloudModelPlugin {
     fn build(&self, app: &mut App) {
         load_shader_library!(app, "medium.wesl");
         load_shader_library!(app, "planet.wesl");
+        load_shader_library!(app, "data.wesl");
+        load_shader_library!(app, "zones.wesl");
+        load_shader_library!(app, "profile.wesl");
+        load_shader_library!(app, "layer.wesl");
         // Not loaded as an embedded asset: that would come later, and could take the place of a user's module.
         let built_in = Shader::from_wesl(include_str!("model.wesl"), MODEL_PATH);
         let module = app.world_mut().resource_mut::<Assets<Shader>>().add(built_in);
@@ -43,8 +48,20 @@ impl Plugin for CloudModelPlugin {
     }
 }
 
+/// The deck of a model that says nothing of decks.
+const ONE_DECK: &str = "
+fn model_deck(i: u32) -> vec2<f32> {
+    if i > 0u { return vec2<f32>(1.0, 0.0); }
+    return model_bounds();
+}
+";
+
 fn replace_model(source: Res<ModelShader>, module: Res<ModelModule>, mut shaders: ResMut<Assets<Shader>>) {
-    let shader = Shader::from_wesl(source.0.clone(), MODEL_PATH);
+    let mut text = source.0.clone();
+    if !text.contains("fn model_deck") {
+        text.push_str(ONE_DECK);
+    }
+    let shader = Shader::from_wesl(text, MODEL_PATH);
     if shaders.insert(module.0.id(), shader).is_err() {
         error!("clouds: the model's shader asset is gone; the model was not replaced");
     }

@@ -10,10 +10,10 @@ use bevy::{
     },
 };
 
-use super::{ModelBindings, ModelShader, ModelUniform, TangentFrame, TexelSizes};
+use super::{ModelBindings, ModelSettings, ModelShader, ModelUniform, TangentFrame, TexelSizes};
 use crate::{
     reference::planet::PLANET_RADIUS,
-    settings::{CloudClock, CloudModel, Validate},
+    settings::{CloudClock, CloudLayers, CloudModel, Validate},
     textures::CloudTextureViews,
 };
 
@@ -35,8 +35,10 @@ impl ModelShader {
         let centre = DVec3::new(0.0, -PLANET_RADIUS, 0.0);
         let frame = TangentFrame::below(camera + model.world_offset, centre, PLANET_RADIUS)
             .ok_or("the camera is at the planet's centre, or not a number")?;
+        let layers = app.world().get_resource::<CloudLayers>().ok_or("no CloudLayers")?;
+        let settings = ModelSettings { model, layers, zones: &[] };
         let device = world.resource::<RenderDevice>();
-        let mut uniform = UniformBuffer::from(ModelUniform::new(model, clock.seconds, &frame, sizes));
+        let mut uniform = UniformBuffer::from(ModelUniform::new(&settings, clock.seconds, &frame, sizes));
         uniform.write_buffer(device, world.resource::<RenderQueue>());
         let bindings = world.get_resource::<ModelBindings>().ok_or("clouds are off on this device")?;
         let group = bindings

@@ -1,6 +1,7 @@
 //! From the main world to what one view's passes need.
 
 use bevy::{
+    camera::MainPassResolutionOverride,
     math::DVec3,
     pbr::{ExtractedAtmosphere, ExtractedDirectionalLight},
     prelude::*,
@@ -15,20 +16,21 @@ use bevy::{
 };
 
 use super::{
-    CloudBuffer, CloudFrame, CloudNoise, StatusFlags,
+    CloudBuffer, CloudDepth, CloudFrame, CloudNoise, StatusFlags,
     bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey},
     phase_slots::PhaseSlots,
+    pipelines::DrawnInto,
     reproject::{HeldUniform, Pose},
 };
 use crate::{
-    model::{ModelUniform, TangentFrame, TexelSizes},
+    model::{ModelSettings, ModelUniform, TangentFrame, TexelSizes},
     phases::ReadyTables,
     reference::planet::PLANET_RADIUS,
     settings::{
-        CloudDebugView, CloudLighting, CloudModel, CloudPhase, CloudQuality, CloudSettings, CloudView, GoodPhases,
-        GoodSettings, Validate,
+        CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase, CloudQuality, CloudSettings,
+        CloudView, GoodPhases, GoodSettings, Validate,
     },
     textures::CloudTextureViews,
 };
@@ -36,7 +38,7 @@ use crate::{
 /// The settings of this frame.
 #[derive(Resource, Default)]
 pub(crate) struct ExtractedClouds {
-    settings: CloudSettings,
+    pub settings: CloudSettings,
     /// Phase functions beside the lighting's own.
     phases: Vec<CloudPhase>,
     pub(super) tables: ReadyTables,
@@ -50,7 +52,9 @@ pub(crate) struct ExtractedCloudView {
     quality: CloudQuality,
     reset: u32,
     pub debug: CloudDebugView,
+    pub order: CloudOrder,
     pub buffer: Option<AssetId<Image>>,
+    pub depth: Option<AssetId<Image>>,
     pub frame: Option<AssetId<Image>>,
     pub noise: Option<AssetId<Image>>,
 }
@@ -58,6 +62,14 @@ pub(crate) struct ExtractedCloudView {
 impl ExtractedCloudView {
     pub fn is_path_traced(&self) -> bool {
         self.quality.is_path_traced()
+    }
+
+    /// What its clouds are drawn into.
+    pub fn drawn_into(&self, msaa: Msaa) -> DrawnInto {
+        match self.order {
+            CloudOrder::Sorted | CloudOrder::BeforeTransparent => DrawnInto::TransparentPass(msaa.samples()),
+            CloudOrder::AfterTransparent => DrawnInto::Colour,
+        }
     }
 }
 
@@ -75,6 +87,7 @@ type CameraItems = (
     &'static Camera,
     Option<&'static CloudView>,
     Option<&'static CloudBuffer>,
+    Option<&'static CloudDepth>,
     Option<&'static CloudFrame>,
     Option<&'static CloudNoise>,
 );
@@ -116,7 +129,7 @@ pub(crate) fn extract_views(
     had: Query<(), With<ExtractedCloudView>>,
     mut warned: Local<Option<String>>,
 ) {
-    for (entity, camera, view, buffer, frame, noise) in &cameras {
+    for (entity, camera, view, buffer, depth, frame, noise) in &cameras {
         let Some(view) = view.filter(|v| v.enabled && camera.is_active) else {
             if had.contains(entity) {
                 commands.entity(entity).remove::<Ours>();
@@ -140,7 +153,9 @@ pub(crate) fn extract_views(
             quality,
             reset: view.reset,
             debug: view.debug,
+            order: view.order,
             buffer: buffer.map(|b| b.0.id()),
+            depth: depth.map(|d| d.0.id()),
             frame: frame.map(|f| f.0.id()),
             noise: noise.map(|n| n.0.id()),
         });
@@ -189,9 +204,18 @@ pub(crate) struct PreparedView {
     view: &'static ExtractedView,
     camera: &'static ExtractedCamera,
     msaa: &'static Msaa,
+    small: Option<&'static MainPassResolutionOverride>,
     atmosphere: Option<&'static ExtractedAtmosphere>,
     history: Option<&'static mut CloudHistory>,
     uniforms: Option<&'static mut CloudUniforms>,
+}
+
+impl PreparedViewItem<'_, '_> {
+    /// What the scene is drawn into: less than the view where it is enlarged later.
+    fn drawn_viewport(&self) -> UVec4 {
+        let whole = self.view.viewport;
+        self.small.map_or(whole, |size| UVec4::new(whole.x, whole.y, size.x.min(whole.z), size.y.min(whole.w)))
+    }
 }
 
 pub(crate) fn prepare_views(
@@ -208,7 +232,7 @@ pub(crate) fn prepare_views(
     let Some(sizes) = TexelSizes::of(&textures) else { return };
     let sun = brightest_sun(&lights);
     for mut item in &mut views {
-        let viewport = item.view.viewport;
+        let viewport = item.drawn_viewport();
         if viewport.z == 0 || viewport.w == 0 {
             commands.entity(item.entity).remove::<(CloudHistory, CloudUniforms, CloudBindGroups)>();
             continue;
@@ -233,7 +257,7 @@ pub(crate) fn prepare_views(
             None => first.insert(CloudHistory::new(&device, key, pose)),
         };
         let (window, held) = (history.frame, history.held_uniform());
-        let (model, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
+        let (model, layers, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
         let phases = PhaseSlots::new(&lighting, &clouds.phases, &clouds.tables);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
@@ -248,7 +272,12 @@ pub(crate) fn prepare_views(
             window,
             debug: item.cloud.debug,
         });
-        let model = ModelUniform::new(&model, clouds.settings.clock.seconds, &space, sizes);
+        let model = ModelUniform::new(
+            &ModelSettings { model: &model, layers: &layers, zones: &[] },
+            clouds.settings.clock.seconds,
+            &space,
+            sizes,
+        );
         let world_from_local = Mat4::from_quat(space.local_from_world.inverse().as_quat());
         let mut own = None;
         let uniforms = match &mut item.uniforms {
@@ -274,24 +303,30 @@ pub(crate) fn prepare_views(
 }
 
 /// The settings with a debug view's changes made to them.
-fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLighting) {
+fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLayers, CloudLighting) {
     let (mut model, mut lighting) = (settings.model.clone(), settings.lighting.clone());
     debug.change_model(&mut model);
     debug.change_lighting(&mut lighting);
-    (model, lighting)
+    (model, settings.layers.clone(), lighting)
 }
 
-/// The tangent frame under a view: planet centre from the scene's atmosphere, else a radius below the world's origin.
+/// Centre (world space plus offset, m) and radius (m): those of the scene's atmosphere, else a radius below the world's
+/// origin.
+pub(crate) fn planet(atmosphere: Option<&ExtractedAtmosphere>) -> (DVec3, f64) {
+    match atmosphere {
+        Some(a) => (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius)),
+        // Bevy's default planet.
+        None => (DVec3::new(0.0, -PLANET_RADIUS, 0.0), PLANET_RADIUS),
+    }
+}
+
+/// The tangent frame under a view.
 fn space_below(
     view: &ExtractedView,
     atmosphere: Option<&ExtractedAtmosphere>,
     settings: &CloudSettings,
 ) -> Option<TangentFrame> {
-    let (centre, radius) = match atmosphere {
-        Some(a) => (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius)),
-        // Bevy's default planet.
-        None => (DVec3::new(0.0, -PLANET_RADIUS, 0.0), PLANET_RADIUS),
-    };
+    let (centre, radius) = planet(atmosphere);
     let camera = view.world_from_view.translation().as_dvec3() + settings.model.world_offset;
     TangentFrame::below(camera, centre, radius)
 }
@@ -304,14 +339,14 @@ fn window_state(
     sun: Sun,
 ) -> (HistoryKey, Pose) {
     let quality = &item.cloud.quality;
-    let view = item.view;
+    let (view, viewport) = (item.view, item.drawn_viewport());
     let model = &clouds.settings.model;
-    let angle = texel_angle(view.clip_from_view, view.viewport, quality);
+    let angle = texel_angle(view.clip_from_view, viewport, quality);
     let altitude = space.altitude as f32;
     let to_shell = (model.bottom - altitude).max(altitude - model.top).max(300.0);
     let key = HistoryKey {
-        size: marched_size(view.viewport, quality),
-        viewport: view.viewport,
+        size: marched_size(viewport, quality),
+        viewport,
         window: quality.held_frames(),
         reset: item.cloud.reset,
         settings: clouds.version,

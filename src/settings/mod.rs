@@ -2,6 +2,7 @@
 
 mod check;
 mod debug;
+mod layers;
 mod lighting;
 mod model;
 mod paths;
@@ -16,6 +17,7 @@ use bevy::prelude::*;
 pub use check::{SettingsError, Validate};
 pub use debug::CloudDebugView;
 pub(crate) use debug::DebugShader;
+pub use layers::{CloudLayer, CloudLayers, LayerKind, MAX_LAYERS, MapChannels};
 pub use lighting::CloudLighting;
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
@@ -24,7 +26,7 @@ pub use phase::{CloudPhase, ModelPhases, PhaseFunction};
 pub use preset::{CloudPreset, PresetError};
 pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
-pub use view::{CloudClock, CloudView};
+pub use view::{CloudClock, CloudOrder, CloudView};
 
 /// The last good value of each setting: what the renderer sees. A bad change is reported once and ignored.
 #[derive(Resource, Clone, Debug, Default)]
@@ -40,6 +42,7 @@ pub(crate) struct CloudSettingsPlugin;
 impl Plugin for CloudSettingsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CloudModel>()
+            .init_resource::<CloudLayers>()
             .init_resource::<CloudLighting>()
             .init_resource::<CloudQuality>()
             .init_resource::<CloudTextures>()
@@ -49,12 +52,14 @@ impl Plugin for CloudSettingsPlugin {
             .init_resource::<ModelPhases>()
             .init_resource::<GoodPhases>()
             .register_type::<CloudModel>()
+            .register_type::<CloudLayers>()
             .register_type::<CloudLighting>()
             .register_type::<CloudQuality>()
             .register_type::<CloudTextures>()
             .register_type::<CloudTextureSlots>()
             .register_type::<CloudClock>()
             .register_type::<CloudView>()
+            .register_type::<CloudOrder>()
             .register_type::<CloudDebugView>()
             .register_type::<CloudPreset>()
             .register_type::<CloudPhase>()
@@ -72,6 +77,7 @@ impl Plugin for CloudSettingsPlugin {
                 Last,
                 (
                     keep_good::<CloudModel>,
+                    keep_good::<CloudLayers>,
                     keep_good::<CloudLighting>,
                     keep_good::<CloudQuality>,
                     keep_good::<CloudTextures>,
@@ -96,7 +102,7 @@ macro_rules! kept {
         })*
     };
 }
-kept!(CloudModel => model, CloudLighting => lighting, CloudQuality => quality,
+kept!(CloudModel => model, CloudLayers => layers, CloudLighting => lighting, CloudQuality => quality,
       CloudTextures => textures, CloudClock => clock);
 
 fn keep_good<S: Kept>(setting: Option<Res<S>>, mut good: ResMut<GoodSettings>, mut reported: Local<Option<String>>) {

@@ -22,6 +22,8 @@ pub enum Erosion {
 #[reflect(Resource, Default, Serialize, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudModel {
+    /// Whether this layer is shown; [`CloudLayers`](super::CloudLayers) have their own. Default true.
+    pub enabled: bool,
     /// Altitude of the lower shell, where bases sit (m above the planet's surface). Default 1300.
     #[reflect(@-400.0..=30_000.0_f32)]
     pub bottom: f32,
@@ -94,6 +96,7 @@ pub struct CloudModel {
 impl Default for CloudModel {
     fn default() -> Self {
         Self {
+            enabled: true,
             bottom: 1300.0,
             top: 3300.0,
             coverage: 0.04,

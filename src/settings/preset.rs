@@ -7,7 +7,7 @@ use bevy::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{CloudLighting, CloudModel, CloudTextures, SettingsError, Validate};
+use super::{CloudLayers, CloudLighting, CloudModel, CloudTextures, SettingsError, Validate};
 
 /// A sky: what to put into [`CloudModel`], [`CloudLighting`] and [`CloudTextures`]. Quality is not part of it.
 ///
@@ -16,8 +16,10 @@ use super::{CloudLighting, CloudModel, CloudTextures, SettingsError, Validate};
 #[reflect(Default, Serialize, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudPreset {
-    /// Where cloud is.
+    /// The thesis's layer.
     pub model: CloudModel,
+    /// Weather-map layers.
+    pub layers: CloudLayers,
     /// How light crosses it.
     pub lighting: CloudLighting,
     /// What the textures are baked from.
@@ -88,6 +90,7 @@ impl CloudPreset {
             .map_err(|source| PresetError::Parse { file: file.to_owned(), source: Box::new(source) })?;
         let named = |source| PresetError::Settings { file: file.to_owned(), source };
         preset.model.validate().map_err(named)?;
+        preset.layers.validate().map_err(named)?;
         preset.lighting.validate().map_err(named)?;
         preset.textures.validate().map_err(named)?;
         Ok(preset)
@@ -111,6 +114,7 @@ impl CloudPreset {
     /// Puts the preset into the world's settings.
     pub fn apply(&self, world: &mut World) {
         world.insert_resource(self.model.clone());
+        world.insert_resource(self.layers.clone());
         world.insert_resource(self.lighting.clone());
         world.insert_resource(self.textures.clone());
     }

@@ -13,7 +13,7 @@ use bevy::{
 };
 use bevy_cumulus::{
     prelude::*,
-    settings::{CloudSettings, PresetError, SettingsError, Validate, snake_case},
+    settings::{CloudSettings, LayerKind, PresetError, SettingsError, Validate, snake_case},
 };
 use serde::{Serialize, de::DeserializeOwned};
 
@@ -26,6 +26,7 @@ fn unusual() -> CloudSettings {
             erosion: Erosion::Subtract,
             ..default()
         },
+        layers: CloudLayers(vec![CloudLayer { coverage: 0.25, kind: LayerKind::Sheet, ..default() }]),
         lighting: CloudLighting { octaves: 3, phase: PhaseFunction::TwoLobe, ground_albedo: Vec3::X, ..default() },
         quality: CloudQuality { integration: Integration::Naive, window: 3, ..CloudQuality::low() },
         textures: CloudTextures { seed: u32::MAX, volume_size: 64, ..default() },
@@ -216,9 +217,11 @@ fn settings_are_read_back_as_written() {
             quality: Some(settings.quality),
             reset: 7,
             debug: CloudDebugView::Steps,
+            order: CloudOrder::AfterTransparent,
         });
         round_trip(&CloudPreset {
             model: settings.model,
+            layers: settings.layers,
             lighting: settings.lighting,
             textures: settings.textures,
             sun_elevation: Some(-3.5),

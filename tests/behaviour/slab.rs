@@ -46,7 +46,7 @@ fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
     if h < {BOTTOM:?} || h > {TOP:?} {{
         return empty_medium();
     }}
-    return Medium(1.0, {extinction:?}, vec3<f32>({:?}, {:?}, {:?}), 1.0, (h - {BOTTOM:?}) / 1000.0,
+    return Medium(1.0, {extinction:?}, vec3<f32>({:?}, {:?}, {:?}), 1.0, vec2(h - {BOTTOM:?}, {TOP:?} - h),
         vec4<f32>(1.0, 0.0, 0.0, 0.0));
 }}
 ",

@@ -76,6 +76,7 @@ fn no_setting_compiles_anything_or_takes_the_clouds_away() {
     let world = app.world();
     let start = CloudSettings {
         model: world.resource::<CloudModel>().clone(),
+        layers: world.resource::<CloudLayers>().clone(),
         lighting: world.resource::<CloudLighting>().clone(),
         quality: world.resource::<CloudQuality>().clone(),
         textures: world.resource::<CloudTextures>().clone(),
@@ -98,6 +99,7 @@ fn no_setting_compiles_anything_or_takes_the_clouds_away() {
             }
             tried += 1;
             app.insert_resource(settings.model)
+                .insert_resource(settings.layers)
                 .insert_resource(settings.lighting)
                 .insert_resource(settings.quality)
                 .insert_resource(settings.textures)

@@ -42,7 +42,7 @@ impl FromWorld for PathTracer {
                         (2, unfiltered()),
                         (3, depth_layout(multisampled)),
                         (4, write(TextureFormat::Rgba32Float)),
-                        (5, write(TextureFormat::Rg32Float)),
+                        (5, write(TextureFormat::Rgba32Float)),
                         (6, uniform_buffer::<Mat4>(false)),
                         (7, write(TextureFormat::Rgba32Float)),
                         // The march's number: they share the shader module.
