@@ -67,7 +67,7 @@ impl Sphere {
         }
         let (mut psi, mut chi) = ([x.cos(), x.sin()], [-x.sin(), x.cos()]);
         let mut terms = Vec::with_capacity(count);
-        for n in 1..=count {
+        for (n, derivative) in derivative.into_iter().enumerate().take(count + 1).skip(1) {
             let up = (2 * n - 1) as f64 / x;
             psi = [psi[1], up * psi[1] - psi[0]];
             chi = [chi[1], up * chi[1] - chi[0]];
@@ -77,7 +77,7 @@ impl Sphere {
                 let size = p * p + q * q;
                 [p * p / size, p * q / size]
             };
-            let ([a_re, a_im], [b_re, b_im]) = (part(derivative[n] / m), part(derivative[n] * m));
+            let ([a_re, a_im], [b_re, b_im]) = (part(derivative / m), part(derivative * m));
             terms.push([a_re, a_im, b_re, b_im]);
         }
         Self { x, terms }
