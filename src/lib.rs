@@ -53,7 +53,7 @@ use bevy::{
     shader::ShaderLoader,
 };
 
-pub use model::ModelShader;
+pub use model::{ModelShader, ModelShaderError};
 pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
 pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},

@@ -233,6 +233,7 @@ impl Plan {
     pub fn effective(&self) -> Effective<'_> {
         Effective {
             model: &self.settings.model,
+            layers: &self.settings.layers,
             lighting: &self.settings.lighting,
             quality: &self.settings.quality,
             textures: &self.settings.textures,
@@ -257,6 +258,7 @@ impl Plan {
 #[derive(Serialize)]
 pub struct Effective<'a> {
     model: &'a CloudModel,
+    layers: &'a CloudLayers,
     lighting: &'a CloudLighting,
     quality: &'a CloudQuality,
     textures: &'a CloudTextures,

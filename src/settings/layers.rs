@@ -55,7 +55,7 @@ pub struct CloudLayer {
     pub map: WeatherRecipe,
     /// Path of an image asset in the recipe's place; it tiles over `map.scale`. Hot-reloaded. Default none.
     pub map_file: String,
-    /// An image in the recipe's place.
+    /// An image in the recipe's place, and in the file's: set in code. Default none.
     #[serde(skip)]
     pub map_image: Option<Handle<Image>>,
     /// What is read from that image. Default [`MapChannels::Rgb`].
@@ -283,6 +283,11 @@ impl Validate for CloudLayers {
             return Err(SettingsError::TooManyLayers { count: self.0.len(), most: MAX_LAYERS });
         }
         for (i, layer) in self.0.iter().enumerate() {
+            let size = layer.map.size;
+            if !size.is_power_of_two() {
+                let field = format!("layers.{i}.map.size");
+                return Err(SettingsError::NotPowerOfTwo { field, value: size, min: 64, max: 2048 });
+            }
             if layer.far_end <= layer.far_start {
                 return Err(SettingsError::Inverted {
                     low: format!("layers.{i}.far_start"),
