@@ -1,10 +1,15 @@
 //! Drives the `headless` example: many pictures in one process, so that textures are baked once.
 
 use std::{
+    collections::hash_map::DefaultHasher,
     fs::{self, File},
+    hash::{Hash as _, Hasher as _},
     io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::{Child, Command, Stdio},
+    sync::mpsc::{RecvTimeoutError, channel},
+    thread,
+    time::{Duration, Instant},
 };
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
@@ -12,8 +17,14 @@ use serde_json::Value;
 
 use crate::{picture::Picture, progress::Progress};
 
+/// Marches nothing: what the rest of a frame takes of the processor.
+const IDLE: &str = "--quality high --set quality.max_distance=100";
+const IDLE_NAME: &str = "idle";
+const IDLE_FRAMES: u32 = 12;
+
 /// Passes whose time is the clouds' cost. Writing `CloudBuffer` is not one: only measuring asks for it.
-const PASSES: [&str; 4] = ["cloud_sky", "cloud_march", "cloud_accumulate", "cloud_composite"];
+const PASSES: [&str; 4] = ["cloud_sky", MARCH, "cloud_accumulate", "cloud_composite"];
+const MARCH: &str = "cloud_march";
 
 /// Where the renderer is, and where its files go.
 pub struct Engine {
@@ -21,6 +32,8 @@ pub struct Engine {
     pub out: PathBuf,
     /// The scenes' fields of view are divided by this.
     pub zoom: f64,
+    /// When to stop, to go on another time.
+    pub deadline: Option<Instant>,
 }
 
 /// One picture to be made.
@@ -38,8 +51,8 @@ pub struct Job {
 /// GPU time of a job (ms a frame).
 #[derive(Clone, Debug, Default)]
 pub struct Cost {
-    /// Each pass of `PASSES`: median of the frames, or the least where [`is_software`]; empty where the device has no
-    /// timestamps.
+    /// Each pass of `PASSES`: median of the frames; empty where the device has no timestamps. Where [`is_software`], the march
+    /// is what the processor spends on a frame beyond one that marches nothing, whatever else it is busy with.
     pub passes: Vec<(&'static str, f64)>,
     pub adapter: String,
 }
@@ -52,7 +65,7 @@ impl Cost {
 
     /// Of the march alone.
     pub fn march(&self) -> Option<f64> {
-        self.passes.iter().find(|(name, _)| *name == "cloud_march").map(|(_, ms)| *ms)
+        self.passes.iter().find(|(name, _)| *name == MARCH).map(|(_, ms)| *ms)
     }
 }
 
@@ -95,12 +108,34 @@ impl Engine {
         self.out.join(scene)
     }
 
-    /// Renders jobs that share scene, size and textures, in this order.
+    /// Renders jobs that share scene, size and textures, in this order; those that a run which was cut off has done are kept.
     pub fn render(&self, scene: &str, size: &str, jobs: &[Job], progress: &Progress) -> Result<()> {
+        self.render_sharing("", scene, size, jobs, progress)
+    }
+
+    /// The same with options that all jobs share.
+    pub fn render_sharing(
+        &self,
+        shared: &str,
+        scene: &str,
+        size: &str,
+        jobs: &[Job],
+        progress: &Progress,
+    ) -> Result<()> {
         let folder = self.folder(scene);
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
-        let mut lines = String::new();
-        for Job { name, options, frames, picture } in jobs {
+        let view = format!("{} {shared}", self.view(scene)?);
+        let stamps: Vec<String> = jobs.iter().map(|job| self.stamp(job, size, &view)).collect::<Result<_>>()?;
+        let is_done = |(job, stamp): &(&Job, &String)| {
+            fs::read_to_string(done_path(&folder, job)).is_ok_and(|found| found == **stamp)
+        };
+        let (done, left): (Vec<_>, Vec<_>) = jobs.iter().zip(&stamps).partition(is_done);
+        progress.skip(done.len());
+        if left.is_empty() {
+            return Ok(());
+        }
+        let mut lines = format!("{IDLE} --frames {IDLE_FRAMES} --timings {IDLE_NAME}.json\n");
+        for (Job { name, options, frames, picture }, _) in &left {
             lines += &format!("{options} --frames {frames} --timings {name}.json");
             lines += &if *picture { format!(" --out {name}.png --cloud {name}.exr\n") } else { "\n".to_owned() };
         }
@@ -111,27 +146,58 @@ impl Engine {
         let mut child = Command::new(fs::canonicalize(&self.headless)?)
             .current_dir(&folder)
             .args(["--scene", scene, "--size", size, "--batch", "batch.txt"])
-            .args(self.view(scene)?.split_whitespace())
+            .args(view.split_whitespace())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(log)
             .spawn()
             .with_context(|| format!("cannot start {}", self.headless.display()))?;
-        let stdout = child.stdout.take().ok_or_else(|| anyhow!("headless has no stdout"))?;
-        let mut done = jobs.iter();
         // One line for each job that is done.
-        for line in BufReader::new(stdout).lines() {
-            line.context("headless")?;
-            if let Some(job) = done.next() {
-                progress.done(&format!("{scene}: {}", job.name));
-            }
-        }
+        let (mut left, mut idle) = (left.into_iter(), None);
+        self.each_line(&mut child, || {
+            let Some(idle) = &idle else {
+                idle = Some(fs::read_to_string(folder.join(IDLE_NAME).with_extension("json")).context("headless")?);
+                return Ok(());
+            };
+            let Some((job, stamp)) = left.next() else { return Ok(()) };
+            fs::write(folder.join(&job.name).with_extension("idle"), idle)
+                .and_then(|()| fs::write(done_path(&folder, job), stamp))
+                .with_context(|| format!("cannot write to {}", folder.display()))?;
+            progress.done(&format!("{scene}: {}", job.name));
+            Ok(())
+        })?;
         if !child.wait().context("headless")?.success() {
             let log = fs::read_to_string(&log_path).unwrap_or_default();
             let tail: Vec<&str> = log.lines().rev().take(5).collect();
             bail!("headless failed in {}: {}", batch.display(), tail.into_iter().rev().collect::<Vec<_>>().join(" / "));
         }
         Ok(())
+    }
+
+    /// Calls `take` at each line that the child prints; ends it where the time is up.
+    fn each_line(&self, child: &mut Child, mut take: impl FnMut() -> Result<()>) -> Result<()> {
+        let stdout = child.stdout.take().ok_or_else(|| anyhow!("headless has no stdout"))?;
+        let (sender, lines) = channel();
+        thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|l| sender.send(l)));
+        loop {
+            let left = self.deadline.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()));
+            match lines.recv_timeout(left) {
+                Ok(_) => take()?,
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+                Err(RecvTimeoutError::Timeout) => {
+                    child.kill().and_then(|()| child.wait()).context("cannot end headless")?;
+                    bail!("the time is up (--minutes); the same command goes on from here");
+                }
+            }
+        }
+    }
+
+    /// What a job's files follow from: they are those of another run only where all of it is the same.
+    fn stamp(&self, job: &Job, size: &str, view: &str) -> Result<String> {
+        let built = fs::metadata(&self.headless)?;
+        let mut hasher = DefaultHasher::new();
+        (built.len(), built.modified().ok(), job.frames, job.picture).hash(&mut hasher);
+        Ok(format!("{:016x} {size} {view} {}", hasher.finish(), job.options))
     }
 
     /// The picture that a job made.
@@ -145,22 +211,39 @@ impl Engine {
     }
 }
 
+/// Says that a job's other files are whole.
+fn done_path(folder: &Path, job: &Job) -> PathBuf {
+    folder.join(&job.name).with_extension("done")
+}
+
 fn read_cost(path: &Path) -> Result<Cost> {
-    let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let all: Value = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
-    let adapter = all["adapter"].as_str().unwrap_or("unknown").to_owned();
-    let which = if is_software(&adapter) { "min" } else { "median" };
-    let time = |name: &'static str| Some((name, all["passes"][name][which].as_f64()?));
+    let read = |path: &Path| -> Result<Value> {
+        let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
+        serde_json::from_str(&text).with_context(|| path.display().to_string())
+    };
+    Ok(cost_of(&read(path)?, &read(&path.with_extension("idle"))?))
+}
+
+/// The cost that the timings of a job say, and those of one that marches nothing.
+fn cost_of(job: &Value, idle: &Value) -> Cost {
+    let adapter = job["adapter"].as_str().unwrap_or("unknown").to_owned();
+    let software = is_software(&adapter);
+    let which = if software { "min" } else { "median" };
+    let time = |name: &'static str| {
+        let processor = |of: &Value| of["processor"]["median"].as_f64();
+        let beyond = processor(job).zip(processor(idle)).map(|(job, idle)| job - idle);
+        let own = beyond.filter(|ms| software && name == MARCH && *ms > 0.0);
+        Some((name, own.or_else(|| job["passes"][name][which].as_f64())?))
+    };
     let passes: Vec<_> = PASSES.into_iter().filter_map(time).collect();
-    Ok(Cost {
+    Cost {
         // One missing makes the sum meaningless.
         passes: if passes.len() == PASSES.len() { passes } else { Vec::new() },
         adapter,
-    })
+    }
 }
 
-/// Whether a driver runs on the processor. It then shares it with whatever else runs, which only ever adds time: the
-/// quickest frame is nearest to the truth.
+/// Whether a driver runs on the processor. It then shares it with whatever else runs, so that clocks on the wall say little.
 pub fn is_software(adapter: &str) -> bool {
     let name = adapter.to_lowercase();
     ["llvmpipe", "lavapipe", "swiftshader"].iter().any(|known| name.contains(known))
@@ -177,11 +260,25 @@ pub fn median(mut values: Vec<f64>) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     #[test]
     fn software_drivers_are_known() {
         assert!(is_software("llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)"));
         assert!(!is_software("NVIDIA H100 (Vulkan)"));
+    }
+
+    #[test]
+    fn in_software_the_march_is_the_processors_time() {
+        let of = |adapter: &str, march: f64, processor: f64| {
+            let spread = |ms: f64| json!({ "min": ms, "median": 2.0 * ms, "max": 9.0 * ms });
+            let passes: Value = PASSES.iter().map(|p| ((*p).to_owned(), spread(march))).collect();
+            json!({ "adapter": adapter, "passes": passes, "processor": spread(processor) })
+        };
+        let software = cost_of(&of("llvmpipe", 7.0, 50.0), &of("llvmpipe", 0.0, 20.0));
+        assert_eq!((software.march(), software.total()), (Some(60.0), Some(81.0)));
+        let gpu = cost_of(&of("a GPU", 7.0, 50.0), &of("a GPU", 0.0, 20.0));
+        assert_eq!((gpu.march(), gpu.total()), (Some(14.0), Some(56.0)));
     }
 
     #[test]

@@ -3,6 +3,7 @@
 //! `fidelity` and `ladder` drive the `headless` example (`engine`), compare its pictures (`metrics`) with references
 //! (`truth`) and write tables and plots. `scripts/fidelity` and `scripts/ladder` build and start it.
 
+mod backdrop;
 mod engine;
 mod fidelity;
 mod ladder;
@@ -13,9 +14,14 @@ mod picture;
 mod plot;
 mod progress;
 mod sheet;
+mod smooth;
 mod truth;
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::PathBuf,
+    process::ExitCode,
+    time::{Duration, Instant},
+};
 
 use anyhow::{Result, anyhow, bail};
 use clap::{Args, Parser, Subcommand};
@@ -78,6 +84,9 @@ struct Common {
     /// Make the references anew
     #[arg(long)]
     fresh: bool,
+    /// Stop after so many minutes; the same command then goes on from there
+    #[arg(long, value_name = "N")]
+    minutes: Option<f64>,
     /// Keep every picture and its timings
     #[arg(long)]
     keep: bool,
@@ -85,7 +94,12 @@ struct Common {
     #[arg(long, value_name = "NAME", default_value = "reference")]
     truth_quality: String,
     /// Options of headless that make the two halves of a reference independent, split by `|`
-    #[arg(long, value_name = "A|B", default_value = "--set quality.seed=1|--set quality.seed=2", allow_hyphen_values = true)]
+    #[arg(
+        long,
+        value_name = "A|B",
+        default_value = "--set quality.seed=1|--set quality.seed=2",
+        allow_hyphen_values = true
+    )]
     truth_halves: String,
 }
 
@@ -103,7 +117,10 @@ impl Common {
             bail!("--headless {}: there is no such file", self.headless.display());
         }
         let out = self.out.clone().unwrap_or_else(|| self.repository.join("target").join(name));
-        Ok(Engine { headless: self.headless.clone(), out, zoom })
+        let limit = self.minutes.map(|minutes| Duration::try_from_secs_f64(60.0 * minutes));
+        let limit = limit.transpose().map_err(|error| anyhow!("--minutes: {error}"))?;
+        let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
+        Ok(Engine { headless: self.headless.clone(), out, zoom, deadline })
     }
 
     fn recipe(&self, small: u32, full: u32) -> Result<Recipe> {

@@ -12,21 +12,24 @@ use serde_json::{Value, json};
 
 use crate::{
     Common,
-    engine::{Cost, Engine, Job, is_software},
+    backdrop::Backdrop,
+    engine::{Cost, Engine, Job},
     machine::Machine,
     metrics::{Errors, Truth},
+    picture::Picture,
     progress::Progress,
     sheet,
 };
+pub use rows::converged;
 use rows::{CONVERGED, Group, HIGH, Row};
 
-const SCENES: [&str; 5] = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills"];
+const SCENES: [&str; 6] = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills", "above"];
 const SMALL_SIZE: &str = "128x72";
 /// Samples of a reference, both halves together.
 const SAMPLES: u32 = 128;
 const FULL_SAMPLES: u32 = 4096;
 /// Frames of a job that only measures High's cost again, and rows between two of them: machines speed up and slow down.
-const HIGH_AGAIN_FRAMES: u32 = 4;
+const HIGH_AGAIN_FRAMES: u32 = 6;
 const HIGH_AGAIN_EVERY: usize = 3;
 
 #[derive(Args)]
@@ -58,8 +61,10 @@ struct SceneResult {
     scene: String,
     /// Share of the picture that is cloud.
     cover: f64,
-    /// FLIP between the reference's halves.
+    /// FLIP between the reference's halves, smoothed.
     noise: f64,
+    /// How far pictures as shown here are from the renderer's own (codes of 255).
+    apart: f64,
     /// One for each row.
     found: Vec<Found>,
 }
@@ -90,15 +95,14 @@ pub fn run(options: &Options) -> Result<()> {
     let scenes: Vec<String> =
         if options.scenes.is_empty() { SCENES.map(str::to_owned).to_vec() } else { options.scenes.clone() };
     let jobs = jobs(&engine, &rows)?;
-    let progress = Progress::begin(scenes.len() * (jobs.len() + 2));
+    let progress = Progress::begin(scenes.len() * (jobs.len() + 2 + Backdrop::PICTURES));
     let mut results = Vec::new();
     for scene in &scenes {
         let truth = recipe.make(&engine, scene, &size, "", &progress)?;
+        let backdrop = Backdrop::of(&engine, scene, &size, &progress)?;
         engine.render(scene, &size, &jobs, &progress)?;
+        let truth = truth.refined(backdrop, &engine.picture(scene, CONVERGED)?.cloud)?;
         results.push(judge(&engine, scene, &rows, &jobs, &truth)?);
-        if !common.keep {
-            remove_pictures(&engine, scene)?;
-        }
     }
     let adapter = results.first().and_then(|r| r.found.first()).map(|f| f.cost.adapter.clone()).unwrap_or_default();
     let whole = options.scenes.is_empty() && options.only.is_empty() && !recipe.is_stand_in();
@@ -113,6 +117,9 @@ pub fn run(options: &Options) -> Result<()> {
         seconds: progress.seconds(),
     };
     drop(progress);
+    if !common.keep {
+        scenes.iter().try_for_each(|scene| remove_pictures(&engine, scene))?;
+    }
     let json_path = engine.out.join("fidelity.json");
     fs::write(&json_path, serde_json::to_string_pretty(&results.to_json())?)
         .with_context(|| format!("cannot write {}", json_path.display()))?;
@@ -147,35 +154,26 @@ fn jobs(engine: &Engine, rows: &[Row]) -> Result<Vec<Job>> {
     Ok(jobs)
 }
 
-/// Cost of a job over High's: the mean of the measurements before and after it, or on a software driver, where other work
-/// only ever adds time, the least of all in the scene.
+/// Cost of a job over High's: the mean of the measurements before and after it.
 fn cost_ratio(engine: &Engine, scene: &str, jobs: &[Job], name: &str) -> Result<Option<f64>> {
     let Some(at) = jobs.iter().position(|job| job.name == name) else { bail!("there is no job {name}") };
-    let own = engine.cost(scene, name)?;
     let is_high = |job: &&Job| !job.picture;
-    let near: Vec<&Job> = if is_software(&own.adapter) {
-        jobs.iter().filter(|job| is_high(job) || job.name == HIGH).collect()
-    } else {
-        let around = [jobs[..at].iter().rev().find(is_high), jobs[at..].iter().find(is_high)];
-        around.into_iter().flatten().collect()
-    };
-    let costs: Vec<Option<f64>> =
-        near.iter().map(|job| Ok(engine.cost(scene, &job.name)?.total())).collect::<Result<_>>()?;
-    let Some(costs) = costs.into_iter().collect::<Option<Vec<f64>>>() else { return Ok(None) };
-    let high = if is_software(&own.adapter) {
-        costs.iter().copied().reduce(f64::min)
-    } else {
-        Some(costs.iter().sum::<f64>() / costs.len() as f64)
-    };
-    Ok(own.total().zip(high).map(|(own, high)| own / high))
+    let around = [jobs[..at].iter().rev().find(is_high), jobs[at..].iter().find(is_high)];
+    let high = around.into_iter().flatten().map(|job| Ok(engine.cost(scene, &job.name)?.total()));
+    let Some(high) = high.collect::<Result<Option<Vec<f64>>>>()? else { return Ok(None) };
+    let mean = high.iter().sum::<f64>() / high.len() as f64;
+    Ok(engine.cost(scene, name)?.total().map(|own| own / mean))
 }
 
 fn judge(engine: &Engine, scene: &str, rows: &[Row], jobs: &[Job], truth: &Truth) -> Result<SceneResult> {
-    let converged = Truth::exact(engine.picture(scene, CONVERGED)?)?;
+    let converged = engine.picture(scene, CONVERGED)?;
+    let apart = truth.apart_from_renderer(&converged)?;
+    let converged = Truth::exact(Picture { shown: truth.shown(&converged), ..converged })?;
     let mut found = Vec::new();
     let mut sheet_rows = Vec::new();
     for row in rows {
-        let picture = engine.picture(scene, row.name)?;
+        let mut picture = engine.picture(scene, row.name)?;
+        picture.shown = truth.shown(&picture);
         let (to_truth, map) = truth.judge(&picture).with_context(|| format!("{scene}: {}", row.name))?;
         let (to_converged, _) = converged.judge(&picture).with_context(|| format!("{scene}: {}", row.name))?;
         let cost = engine.cost(scene, row.name)?;
@@ -188,7 +186,7 @@ fn judge(engine: &Engine, scene: &str, rows: &[Row], jobs: &[Job], truth: &Truth
         }
     }
     sheet::write(&engine.out.join(scene).with_extension("png"), &sheet_rows)?;
-    Ok(SceneResult { scene: scene.to_owned(), cover: truth.cover(), noise: truth.noise()?, found })
+    Ok(SceneResult { scene: scene.to_owned(), cover: truth.cover(), noise: truth.noise()?, apart, found })
 }
 
 fn remove_pictures(engine: &Engine, scene: &str) -> Result<()> {
@@ -222,7 +220,7 @@ impl Results {
                     "to_converged": found.to_converged.to_json(), "cost_ratio": found.ratio });
                 (row.name.to_owned(), all)
             });
-            json!({ "cover": scene.cover, "noise": scene.noise, "rows": rows.collect::<Value>() })
+            json!({ "cover": scene.cover, "noise": scene.noise, "apart": scene.apart, "rows": rows.collect::<Value>() })
         };
         let scenes: Value = self.scenes.iter().map(|scene| (scene.scene.clone(), found(scene))).collect();
         json!({ "size": self.size, "zoom": self.zoom, "samples": self.samples, "stand_in": self.stand_in, "date": self.machine.date,
