@@ -24,7 +24,6 @@ struct Report<'a> {
     settings: Effective<'a>,
     passes: Value,
     frame: Value,
-    processor: Value,
 }
 
 /// Says before the work whether the file can be written after it.
@@ -63,9 +62,9 @@ pub fn write(plan: &Plan, shot: &Shot) -> Result<()> {
         put(path, &encode(&DynamicImage::ImageRgba32F(noise.clone()), ImageFormat::OpenExr)?)?;
     }
     if let Some(path) = &plan.timings {
-        let [passes, frame, processor] = shot.timings.to_json();
+        let (passes, frame) = shot.timings.to_json();
         let settings = plan.effective();
-        let all = Report { adapter: &shot.adapter, size: plan.size, settings, passes, frame, processor };
+        let all = Report { adapter: &shot.adapter, size: plan.size, settings, passes, frame };
         put(path, serde_json::to_string_pretty(&all)?.as_bytes())?;
     }
     cloud.map_or(Ok(()), finite)

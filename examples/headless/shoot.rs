@@ -29,7 +29,7 @@ use crate::{
     common,
     options::Plan,
     status::Stage,
-    timings::{LAG, Timings, processor_ms},
+    timings::{LAG, Timings},
 };
 
 /// How long the first usable frame may take to come, and the last one to come back.
@@ -271,11 +271,10 @@ impl Studio {
             if update + 1 == plan.frames {
                 readback = self.request(plan);
             }
-            let (began, processor) = (Instant::now(), processor_ms());
+            let began = Instant::now();
             self.update()?;
             if counted {
-                let processor = processor_ms().zip(processor).map(|(now, before)| now - before);
-                timings.add_frame(began.elapsed().as_secs_f64() * 1e3, processor);
+                timings.add_frame(began.elapsed().as_secs_f64() * 1e3);
             }
             for entity in std::mem::take(&mut readback) {
                 self.app.world_mut().entity_mut(entity).remove::<Readback>();

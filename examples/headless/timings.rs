@@ -1,6 +1,6 @@
 //! What frames and passes took.
 
-use std::{collections::BTreeMap, fs, time::Instant};
+use std::{collections::BTreeMap, time::Instant};
 
 use bevy::{diagnostic::DiagnosticsStore, prelude::*};
 use serde_json::{Value, json};
@@ -13,20 +13,18 @@ const CLOUD_PASSES: [&str; 4] = ["cloud_sky", "cloud_march", "cloud_accumulate",
 /// since each update here waits for the GPU.
 pub const LAG: u32 = 2;
 
-/// GPU times by pass, and wall and processor times of whole frames (ms).
+/// GPU times by pass, and wall times of whole frames (ms).
 #[derive(Default)]
 pub struct Timings {
     frames: Vec<f64>,
-    processor: Vec<f64>,
     passes: BTreeMap<String, Vec<f64>>,
     last_seen: BTreeMap<String, Instant>,
 }
 
 impl Timings {
-    /// Adds a frame's wall time (ms), GPU included, and the time that the processor spent on it.
-    pub fn add_frame(&mut self, milliseconds: f64, processor: Option<f64>) {
+    /// Adds a frame's wall time (ms), GPU included.
+    pub fn add_frame(&mut self, milliseconds: f64) {
         self.frames.push(milliseconds);
-        self.processor.extend(processor);
     }
 
     /// Takes the GPU times that this update published. With `keep` false they belong to a frame that does not count.
@@ -44,24 +42,12 @@ impl Timings {
         }
     }
 
-    /// Of each pass, of the frame, and of the processor in it: `{median, min, max}` or null, in ms.
-    pub fn to_json(&self) -> [Value; 3] {
+    /// `{"passes": {name: {median, min, max} or null}, "frame": {median, min, max}}`, in ms.
+    pub fn to_json(&self) -> (Value, Value) {
         let mut passes: BTreeMap<&str, Value> = CLOUD_PASSES.into_iter().map(|name| (name, Value::Null)).collect();
         passes.extend(self.passes.iter().map(|(name, times)| (name.as_str(), spread(times))));
-        [json!(passes), spread(&self.frames), spread(&self.processor)]
+        (json!(passes), spread(&self.frames))
     }
-}
-
-/// Time that the processor has spent on this process so far (ms), all threads together; only Linux tells without further
-/// ado. Where the driver runs in software it is what a frame costs, however busy the machine is with other things.
-pub fn processor_ms() -> Option<f64> {
-    let mut nanoseconds = 0.0;
-    for task in fs::read_dir("/proc/self/task").ok()?.flatten() {
-        // A thread may end meanwhile.
-        let text = fs::read_to_string(task.path().join("schedstat")).unwrap_or_default();
-        nanoseconds += text.split_whitespace().next().and_then(|n| n.parse::<f64>().ok()).unwrap_or(0.0);
-    }
-    (nanoseconds > 0.0).then_some(nanoseconds * 1e-6)
 }
 
 fn spread(times: &[f64]) -> Value {

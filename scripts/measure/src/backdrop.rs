@@ -13,8 +13,8 @@ use crate::{
     progress::Progress,
 };
 
-/// No cloud anywhere.
-const CLEAR: &str = "--quality low --set model.coverage=-1";
+/// No cloud anywhere, and textures that are soon baked.
+const CLEAR: &str = "--quality low --set model.coverage=-1 --set textures.volume_size=32 --set textures.map_size=64";
 /// Stops by which the sky is shown darker each time. A pixel is read where it is not yet overexposed.
 const BRACKETS: [f32; 3] = [0.0, 4.0, 8.0];
 /// Codes above this say little about the light.

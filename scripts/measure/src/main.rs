@@ -15,6 +15,7 @@ mod plot;
 mod progress;
 mod sheet;
 mod smooth;
+mod taken;
 mod truth;
 
 use std::{

@@ -12,9 +12,11 @@ use serde_json::Value;
 
 use crate::{
     engine::{Engine, Job},
+    machine::Machine,
     metrics::Truth,
     picture::Picture,
     progress::Progress,
+    taken::Taken,
 };
 
 /// Sources that the path-traced picture follows from. What only the march reads is left out, so that tuning it keeps
@@ -64,6 +66,12 @@ pub struct Recipe {
 impl Recipe {
     pub fn is_stand_in(&self) -> bool {
         self.quality != "reference"
+    }
+
+    /// What a report says of a run with it.
+    pub fn taken(&self, size: String, zoom: f64, machine: Machine, seconds: u64) -> Taken {
+        let stand_in = self.is_stand_in().then(|| self.quality.clone());
+        Taken { size, zoom, samples: self.samples, stand_in, machine, seconds }
     }
 
     /// The truth of a scene; `more` are further options, such as another cut-off distance.

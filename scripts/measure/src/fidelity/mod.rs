@@ -13,12 +13,13 @@ use serde_json::{Value, json};
 use crate::{
     Common,
     backdrop::Backdrop,
-    engine::{Cost, Engine, Job},
+    engine::{Cost, Engine, Job, is_software},
     machine::Machine,
     metrics::{Errors, Truth},
     picture::Picture,
     progress::Progress,
     sheet,
+    taken::Taken,
 };
 pub use rows::converged;
 use rows::{CONVERGED, Group, HIGH, Row};
@@ -71,15 +72,9 @@ struct SceneResult {
 
 /// All that a report is written from.
 struct Results {
-    size: String,
-    zoom: f64,
-    samples: u32,
-    /// What stands for the reference, where it is not the path tracer.
-    stand_in: Option<String>,
+    taken: Taken,
     rows: Vec<Row>,
     scenes: Vec<SceneResult>,
-    machine: Machine,
-    seconds: u64,
 }
 
 pub fn run(options: &Options) -> Result<()> {
@@ -106,16 +101,8 @@ pub fn run(options: &Options) -> Result<()> {
     }
     let adapter = results.first().and_then(|r| r.found.first()).map(|f| f.cost.adapter.clone()).unwrap_or_default();
     let whole = options.scenes.is_empty() && options.only.is_empty() && !recipe.is_stand_in();
-    let results = Results {
-        size,
-        zoom: engine.zoom,
-        samples: recipe.samples,
-        stand_in: recipe.is_stand_in().then(|| recipe.quality.clone()),
-        rows,
-        scenes: results,
-        machine: Machine::this(&adapter),
-        seconds: progress.seconds(),
-    };
+    let taken = recipe.taken(size, engine.zoom, Machine::this(&adapter), progress.seconds());
+    let results = Results { taken, rows, scenes: results };
     drop(progress);
     if !common.keep {
         scenes.iter().try_for_each(|scene| remove_pictures(&engine, scene))?;
@@ -154,15 +141,26 @@ fn jobs(engine: &Engine, rows: &[Row]) -> Result<Vec<Job>> {
     Ok(jobs)
 }
 
-/// Cost of a job over High's: the mean of the measurements before and after it.
+/// Cost of a job over High's: the mean of the measurements before and after it, or on a software driver, where other work
+/// only ever adds time, the least of all in the scene.
 fn cost_ratio(engine: &Engine, scene: &str, jobs: &[Job], name: &str) -> Result<Option<f64>> {
     let Some(at) = jobs.iter().position(|job| job.name == name) else { bail!("there is no job {name}") };
+    let own = engine.cost(scene, name)?;
     let is_high = |job: &&Job| !job.picture;
-    let around = [jobs[..at].iter().rev().find(is_high), jobs[at..].iter().find(is_high)];
-    let high = around.into_iter().flatten().map(|job| Ok(engine.cost(scene, &job.name)?.total()));
+    let near: Vec<&Job> = if is_software(&own.adapter) {
+        jobs.iter().filter(|job| is_high(job) || job.name == HIGH).collect()
+    } else {
+        let around = [jobs[..at].iter().rev().find(is_high), jobs[at..].iter().find(is_high)];
+        around.into_iter().flatten().collect()
+    };
+    let high = near.iter().map(|job| Ok(engine.cost(scene, &job.name)?.total()));
     let Some(high) = high.collect::<Result<Option<Vec<f64>>>>()? else { return Ok(None) };
-    let mean = high.iter().sum::<f64>() / high.len() as f64;
-    Ok(engine.cost(scene, name)?.total().map(|own| own / mean))
+    let high = if is_software(&own.adapter) {
+        high.iter().copied().reduce(f64::min)
+    } else {
+        Some(high.iter().sum::<f64>() / high.len() as f64)
+    };
+    Ok(own.total().zip(high).map(|(own, high)| own / high))
 }
 
 fn judge(engine: &Engine, scene: &str, rows: &[Row], jobs: &[Job], truth: &Truth) -> Result<SceneResult> {
@@ -223,7 +221,8 @@ impl Results {
             json!({ "cover": scene.cover, "noise": scene.noise, "apart": scene.apart, "rows": rows.collect::<Value>() })
         };
         let scenes: Value = self.scenes.iter().map(|scene| (scene.scene.clone(), found(scene))).collect();
-        json!({ "size": self.size, "zoom": self.zoom, "samples": self.samples, "stand_in": self.stand_in, "date": self.machine.date,
-            "adapter": self.machine.adapter, "commit": self.machine.commit, "scenes": scenes })
+        let Taken { size, zoom, samples, stand_in, machine, .. } = &self.taken;
+        json!({ "size": size, "zoom": zoom, "samples": samples, "stand_in": stand_in, "date": machine.date,
+            "adapter": machine.adapter, "commit": machine.commit, "scenes": scenes })
     }
 }
