@@ -85,6 +85,7 @@ impl Recipe {
         if have && !self.fresh {
             progress.skip(names.len());
         } else {
+            eprintln!("making {}", kept.display());
             self.render(engine, scene, size, &options, &kept, progress)?;
         }
         let [a, b] = names.map(|name| Picture::read(&kept.join(name)));
