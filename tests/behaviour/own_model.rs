@@ -40,7 +40,12 @@ fn a_model_that_does_not_compile_leaves_the_last_good_one() {
         assert!(linear_pixels(&app, &view) == picture, "the clouds change: {spoilt}");
         assert!(app.world().resource::<CloudStatus>().is_ready());
         assert_shaders_compile(&app);
-        assert_eq!(times_logged(&says), logged + 1, "{says:?} is not reported once: {:?}", app.world().resource::<Heard>().0);
+        assert_eq!(
+            times_logged(&says),
+            logged + 1,
+            "{says:?} is not reported once: {:?}",
+            app.world().resource::<Heard>().0
+        );
         let told = &app.world().resource::<Heard>().0[heard..];
         assert!(told.len() == 1 && told[0].line == Some(line), "{told:?}");
     }
