@@ -43,7 +43,8 @@ impl Picture {
     }
 }
 
-fn decode(code: u8) -> f64 {
+/// Light of an sRGB code.
+pub fn decode(code: u8) -> f64 {
     let v = f64::from(code) / 255.0;
     if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
