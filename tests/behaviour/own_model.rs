@@ -30,7 +30,7 @@ fn a_model_that_does_not_compile_leaves_the_last_good_one() {
     for (spoilt, line) in [
         (good.replace("return 1.0;", "\n\nreturn 1u;"), 5),
         (good.replace("return empty_medium();", "\nreturn nothing_7391();"), 7),
-        (good.replace("return vec2(", "\nreturn vec2(("), 4),
+        (good.replace("return vec2(", "\nreturn vec2(("), 3),
     ] {
         assert_ne!(spoilt, good);
         let says = format!("the model does not compile, line {line}: ");
