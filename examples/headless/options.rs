@@ -223,7 +223,6 @@ impl Plan {
             ("--size", self.size == other.size),
             ("--no-sky", self.sky == other.sky),
             ("--msaa", self.msaa == other.msaa),
-            ("the exposure", self.ev100 == other.ev100),
             ("--debug", self.debug == other.debug),
             ("a setting of textures", self.settings.textures == other.settings.textures),
         ];

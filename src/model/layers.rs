@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::{TangentFrame, uniform::wrapped};
 use crate::{
-    settings::{CloudLayer, CloudModel, LayerKind, MAX_LAYERS},
+    settings::{CloudLayer, CloudModel, CloudPhase, LayerKind, MAX_LAYERS},
     weather::SWIRL_SIZE,
 };
 
@@ -88,7 +88,14 @@ pub(crate) struct ZoneUniform {
 
 impl LayerUniform {
     /// The layer at cloud time `seconds`, seen from a frame; `map` is its place in the texture array.
-    pub fn new(layer: &CloudLayer, map: usize, seconds: f64, frame: &TangentFrame, sizes: &LayerSizes) -> Self {
+    pub fn new(
+        layer: &CloudLayer,
+        map: usize,
+        seconds: f64,
+        frame: &TangentFrame,
+        sizes: &LayerSizes,
+        phases: &[CloudPhase],
+    ) -> Self {
         let wind = DVec2::new(layer.wind.x.into(), layer.wind.z.into());
         let drift = DVec2::new(layer.drift.x, layer.drift.z);
         let at = frame.map - drift - wind * seconds;
@@ -113,11 +120,13 @@ impl LayerUniform {
         let finer = plane(layer.shape_scale / FINER, stretched(at) + DVec2::splat(rise));
         let renewed = at - downwind * (f64::from(layer.renewal) * seconds);
         let wave = |k: usize| (renewed.dot(WAVES[k]) / scale + place(k as u32) * TAU).rem_euclid(TAU) as f32;
+        let own_phase = phases.iter().position(|phase| layer.own_phase && *phase == layer.phase);
+        let phase = own_phase.map_or(0, |slot| slot as u32 + 1);
         let texel = |scale: f32, size: u32| (scale / size.max(1) as f32).log2();
         Self {
             kind: u32::from(is_sheet),
             map: map as u32,
-            phase: 0,
+            phase,
             coverage: layer.coverage,
             sharpness: layer.sharpness,
             base: layer.base,

@@ -103,10 +103,11 @@ impl ModelUniform {
         let own = Self::of_profile(settings.model, seconds, frame, sizes);
         let maps = sizes.layers.map_or([false; MAX_LAYERS], |sizes| sizes.maps);
         let shown = || settings.layers.shown().filter(|(i, _)| maps[*i]);
+        let phases = settings.layers.phases();
         let mut layers = [LayerUniform::default(); MAX_LAYERS];
         if let Some(sizes) = &sizes.layers {
             for (slot, (i, layer)) in layers.iter_mut().zip(shown()) {
-                *slot = LayerUniform::new(layer, i, seconds, frame, sizes);
+                *slot = LayerUniform::new(layer, i, seconds, frame, sizes, &phases);
             }
         }
         let ranges = decks(settings.model, shown().map(|(_, layer)| layer));

@@ -3,7 +3,7 @@
 use bevy::{math::DVec3, prelude::*};
 use serde::{Deserialize, Serialize};
 
-use super::{SettingsError, Validate};
+use super::{CloudPhase, SettingsError, Validate};
 use crate::weather::WeatherRecipe;
 
 /// Most layers that are shown at once.
@@ -141,6 +141,11 @@ pub struct CloudLayer {
     /// Single-scattering albedo σs/σt, linear RGB. Default 0.9995.
     #[reflect(@0.0..=1.0_f32)]
     pub albedo: Vec3,
+    /// Whether `phase` is used in place of [`CloudLighting`](super::CloudLighting)'s phase function. Layers may have three
+    /// different ones of their own; what is more takes the light's. Default false.
+    pub own_phase: bool,
+    /// The layer's own phase function.
+    pub phase: CloudPhase,
     /// Precipitation (0..1): a thicker, darker base and shafts of rain below it. Default 0.
     #[reflect(@0.0..=1.0_f32)]
     pub rain: f32,
@@ -208,6 +213,8 @@ impl Default for CloudLayer {
             density: 1.0,
             extinction: 0.05,
             albedo: Vec3::splat(0.9995),
+            own_phase: false,
+            phase: CloudPhase::default(),
             rain: 0.0,
             rain_extinction: 0.0012,
             rain_depth: 2000.0,
@@ -245,6 +252,26 @@ impl CloudLayers {
     /// Those that are enabled, with their places in the list.
     pub fn shown(&self) -> impl Iterator<Item = (usize, &CloudLayer)> {
         self.0.iter().enumerate().filter(|(_, layer)| layer.enabled).take(MAX_LAYERS)
+    }
+
+    /// Distance from the ground to where the bases of high layers pass below the horizon (m); 0 without any. Cirrus is seen
+    /// much farther than cumulus, and few long steps show it.
+    pub(crate) fn highest_horizon(&self, radius: f64) -> f32 {
+        /// Lower layers end at `quality.max_distance` (m).
+        const HIGH: f32 = 2500.0;
+        let bases = self.shown().map(|(_, layer)| layer.base).filter(|base| *base > HIGH);
+        bases.map(|base| (2.0 * radius * f64::from(base)).sqrt() as f32).fold(0.0, f32::max)
+    }
+
+    /// The different phase functions of layers that have their own: slots 1 to 3.
+    pub(crate) fn phases(&self) -> Vec<CloudPhase> {
+        let mut phases = Vec::new();
+        for (_, layer) in self.shown().filter(|(_, layer)| layer.own_phase) {
+            if phases.len() < 3 && !phases.contains(&layer.phase) {
+                phases.push(layer.phase);
+            }
+        }
+        phases
     }
 }
 

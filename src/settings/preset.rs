@@ -58,11 +58,29 @@ pub enum PresetError {
 }
 
 /// Names and texts of the presets that come with the crate.
-const BUILT_IN: [(&str, &str); 4] = [
+const BUILT_IN: [(&str, &str); 22] = [
     ("ClearDay", include_str!("../../assets/presets/clear_day.clouds.ron")),
     ("FairWeather", include_str!("../../assets/presets/fair_weather.clouds.ron")),
     ("Overcast", include_str!("../../assets/presets/overcast.clouds.ron")),
     ("Sunset", include_str!("../../assets/presets/sunset.clouds.ron")),
+    ("Cirrus", include_str!("../../assets/presets/cirrus.clouds.ron")),
+    ("Cirrocumulus", include_str!("../../assets/presets/cirrocumulus.clouds.ron")),
+    ("Cirrostratus", include_str!("../../assets/presets/cirrostratus.clouds.ron")),
+    ("Altocumulus", include_str!("../../assets/presets/altocumulus.clouds.ron")),
+    ("Altostratus", include_str!("../../assets/presets/altostratus.clouds.ron")),
+    ("Nimbostratus", include_str!("../../assets/presets/nimbostratus.clouds.ron")),
+    ("Stratocumulus", include_str!("../../assets/presets/stratocumulus.clouds.ron")),
+    ("Stratus", include_str!("../../assets/presets/stratus.clouds.ron")),
+    ("Cumulus", include_str!("../../assets/presets/cumulus.clouds.ron")),
+    ("Cumulonimbus", include_str!("../../assets/presets/cumulonimbus.clouds.ron")),
+    ("FairWeatherCumulus", include_str!("../../assets/presets/fair_weather_cumulus.clouds.ron")),
+    ("ToweringCumulus", include_str!("../../assets/presets/towering_cumulus.clouds.ron")),
+    ("Broken", include_str!("../../assets/presets/broken.clouds.ron")),
+    ("Storm", include_str!("../../assets/presets/storm.clouds.ron")),
+    ("WinterStratus", include_str!("../../assets/presets/winter_stratus.clouds.ron")),
+    ("MackerelSky", include_str!("../../assets/presets/mackerel_sky.clouds.ron")),
+    ("RedSunset", include_str!("../../assets/presets/red_sunset.clouds.ron")),
+    ("AfterRain", include_str!("../../assets/presets/after_rain.clouds.ron")),
 ];
 
 impl CloudPreset {

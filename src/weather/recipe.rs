@@ -11,7 +11,7 @@ use crate::settings::{SettingsError, Validate};
 /// directions are rounded to the nearest ones that make the map repeat without a seam, so the coarser a thing is against
 /// `scale`, the coarser its steps.
 ///
-/// Costs are of `size` alone: 512² texels take about 0.1 s of one processor core, optimised, and four times as many four
+/// Costs are of `size` alone: 512² texels take about a quarter of a second of one processor core, and four times as many four
 /// times as long. What a control adds is not computed where it is 0.
 #[derive(Reflect, Serialize, Deserialize, Clone, PartialEq, Debug)]
 #[reflect(Default, Serialize, Deserialize, PartialEq)]

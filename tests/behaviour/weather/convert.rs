@@ -132,6 +132,9 @@ fn samples_are_filtered_and_repeat() {
         let found = map.sample(Vec2::new(u, 0.3)).x;
         assert!((found - expected).abs() < 1e-5, "{found} at {u}");
     }
+    let map = made(&small());
+    let far = map.sample(Vec2::new(40_000.25, -80_000.5));
+    assert_eq!(far, map.sample(Vec2::new(0.25, 0.5)), "far places are as exact as near ones");
 }
 
 #[test]
