@@ -126,7 +126,9 @@ fn sun_advice(preset: &CloudPreset) -> String {
         Some(elevation) => format!("Made for a sun {elevation:.0}° above the horizon"),
         None => "Made for any sun".to_owned(),
     };
-    format!("{made_for}. Sets model, layers, lighting and textures; the light is the app's, which is told and may move it.")
+    format!(
+        "{made_for}. Sets model, layers, lighting and textures; the light is the app's, which is told and may move it."
+    )
 }
 
 /// The preset that the settings and the scene's brightest light amount to.

@@ -17,7 +17,10 @@ use crate::{
 /// Groups of a layer's fields. What stands in none of them is shown before them.
 const GROUPS: [(&str, &[&str]); 7] = [
     ("Coverage", &["coverage", "sharpness", "far_coverage", "far_start", "far_end"]),
-    ("Altitude and profile", &["base", "base_rise", "thickness", "peak_height", "profile_strength", "base_to_top", "anvil"]),
+    (
+        "Altitude and profile",
+        &["base", "base_rise", "thickness", "peak_height", "profile_strength", "base_to_top", "anvil"],
+    ),
     ("Shape", &["shape_gain", "shape_strength", "shape_scale", "stretch", "stretch_angle"]),
     (
         "Detail and turbulence",
@@ -72,7 +75,9 @@ impl LayersState {
                 ui.push_id(i, |ui| {
                     changed |= buttons_ui(ui, i, layer, &mut asked);
                     let title = format!("{:.0} to {:.0} m", layer.bottom(), layer.top());
-                    CollapsingHeader::new(title).id_salt("layer").show(ui, |ui| changed |= layer_ui(ui, i, layer, previews));
+                    CollapsingHeader::new(title)
+                        .id_salt("layer")
+                        .show(ui, |ui| changed |= layer_ui(ui, i, layer, previews));
                 });
             }
             changed | asked.is_some_and(|(i, asked)| obey(&mut layers.0, i, asked))
@@ -92,7 +97,9 @@ fn add_ui(ui: &mut Ui, layers: &mut Vec<CloudLayer>, presets: &[(&str, CloudPres
                     added = Some(layer);
                 }
             }
-            for (preset, layer) in presets.iter().flat_map(|(name, preset)| preset.layers.0.iter().map(move |l| (name, l))) {
+            for (preset, layer) in
+                presets.iter().flat_map(|(name, preset)| preset.layers.0.iter().map(move |l| (name, l)))
+            {
                 if ui.selectable_label(false, format!("{preset}: {}", layer.name)).clicked() {
                     added = Some(layer.clone());
                 }

@@ -41,7 +41,8 @@ impl List {
     /// Clicks on the `n`-th text of these words, and gives lists and sections time to open.
     fn click(&mut self, text: &str, n: usize) -> Texts {
         let texts = self.frame(vec![]);
-        let at = texts.iter().filter(|(shown, _)| shown == text).nth(n).unwrap_or_else(|| panic!("{text} in {texts:?}")).1;
+        let at =
+            texts.iter().filter(|(shown, _)| shown == text).nth(n).unwrap_or_else(|| panic!("{text} in {texts:?}")).1;
         for events in click(at) {
             self.frame(events);
         }
@@ -104,7 +105,8 @@ fn a_layer_is_hidden_and_renamed() {
     // Where the focus was before is the click's affair: any of the line's switches is this layer's.
     let name = find(&list.frame(vec![]), "name");
     let texts = list.frame(vec![]);
-    let text = texts.iter().filter(|(shown, _)| shown == "low").map(|(_, at)| *at).find(|at| (at.y - name.y).abs() < 4.0);
+    let text =
+        texts.iter().filter(|(shown, _)| shown == "low").map(|(_, at)| *at).find(|at| (at.y - name.y).abs() < 4.0);
     for events in click(text.expect("a box with the name")) {
         list.frame(events);
     }

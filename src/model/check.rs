@@ -97,7 +97,9 @@ fn is_library(path: &str) -> bool {
 fn composed(_: &(), source: ShaderCacheSource, _: &ValidateShader) -> Result<String, ShaderCacheError> {
     match source {
         ShaderCacheSource::Wgsl(text) => Ok(text),
-        ShaderCacheSource::SpirV(_) => Err(ShaderCacheError::CreateShaderModule("a binary cannot be imported".to_owned())),
+        ShaderCacheSource::SpirV(_) => {
+            Err(ShaderCacheError::CreateShaderModule("a binary cannot be imported".to_owned()))
+        }
     }
 }
 

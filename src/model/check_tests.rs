@@ -53,7 +53,12 @@ fn a_mistake_is_found_on_its_line() {
         ("return medium;", "return 1.0;", 21, ""),
         ("const BASE: f32 = 1000.0", "const BASE: f32 = true", 3, ""),
         // What the renderer calls.
-        ("density_bound(p: vec3<f32>, lod: f32) -> f32 { return 1.0; }", "density_bound(p: vec3<f32>) -> f32 { return 1.0; }", 9, "density_bound must give f32"),
+        (
+            "density_bound(p: vec3<f32>, lod: f32) -> f32 { return 1.0; }",
+            "density_bound(p: vec3<f32>) -> f32 { return 1.0; }",
+            9,
+            "density_bound must give f32",
+        ),
         ("-> f32 { return 1.0; }", "-> vec2<f32> { return vec2(1.0); }", 9, "density_bound must give f32"),
     ] {
         let Verdict::Bad(error) = verdict(from, to) else { panic!("{to} passes") };

@@ -30,9 +30,15 @@ const LARGEST: u32 = 2048;
 #[derive(Clone, PartialEq, Debug)]
 enum Source {
     Recipe(WeatherRecipe),
-    Image { image: AssetId<Image>, revision: u32, channels: MapChannels },
+    Image {
+        image: AssetId<Image>,
+        revision: u32,
+        channels: MapChannels,
+    },
     /// The file's path is none.
-    NoPath { reason: String },
+    NoPath {
+        reason: String,
+    },
 }
 
 /// Texels of each level, finest first.

@@ -42,16 +42,25 @@ fn kinds() -> Vec<(&'static str, Vec<CloudLayer>)> {
         one("cumulus", cumulus()),
         // The density is the profile: the most there can be.
         one("no noise", CloudLayer { shape_strength: 0.0, detail_strength: 0.0, ..cumulus() }),
-        one("full gain", CloudLayer { shape_gain: 8.0, profile_strength: 4.0, density: 3.0, sharpness: 6.0, ..cumulus() }),
+        one(
+            "full gain",
+            CloudLayer { shape_gain: 8.0, profile_strength: 4.0, density: 3.0, sharpness: 6.0, ..cumulus() },
+        ),
         one("sheet", cirrus()),
         one("anvil", CloudLayer { anvil: 1.0, thickness: 9000.0, base_rise: 0.0, shape_strength: 0.2, ..cumulus() }),
         one("rain", CloudLayer { rain: 1.0, base: 1800.0, rain_depth: 1500.0, map: map(7.0), ..cumulus() }),
         one("more far", CloudLayer { far_coverage: 0.8, far_start: 3000.0, far_end: 30_000.0, ..cumulus() }),
-        one("less far", CloudLayer { far_coverage: -0.8, far_start: 3000.0, far_end: 30_000.0, map: map(7.0), ..cumulus() }),
+        one(
+            "less far",
+            CloudLayer { far_coverage: -0.8, far_start: 3000.0, far_end: 30_000.0, map: map(7.0), ..cumulus() },
+        ),
         one("lean", CloudLayer { wind_skew: 8000.0, thickness: 3000.0, base_rise: 0.0, ..cumulus() }),
         one("turbulence", CloudLayer { turbulence: 3000.0, turbulence_height: 10.0, base_to_top: 0.7, ..cumulus() }),
         one("coverage", CloudLayer { coverage: 0.3, map: map(1.0), ..cumulus() }),
-        ("overlap", vec![cumulus(), CloudLayer { base: 1500.0, map: WeatherRecipe { seed: 9, ..map(5.0) }, ..cumulus() }]),
+        (
+            "overlap",
+            vec![cumulus(), CloudLayer { base: 1500.0, map: WeatherRecipe { seed: 9, ..map(5.0) }, ..cumulus() }],
+        ),
         ("two decks", vec![cumulus(), cirrus()]),
     ]
 }
@@ -93,7 +102,10 @@ fn nothing_in_a_layer_is_denser_than_the_bound_around_it() {
         }
         println!("{what}: {empty} certainly empty, {cloud} in cloud, up to {close} of the bound");
         // A bound that is never 0 would be true and of no use; so would one that is far above everything.
-        assert!(empty > 3000 && cloud > 100 && close > 0.15, "{what}: {empty} empty, {cloud} cloud, {close} of the bound");
+        assert!(
+            empty > 3000 && cloud > 100 && close > 0.15,
+            "{what}: {empty} empty, {cloud} cloud, {close} of the bound"
+        );
     }
 }
 
