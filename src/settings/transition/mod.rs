@@ -2,6 +2,8 @@
 
 mod mix;
 mod sky;
+#[cfg(test)]
+mod tests;
 
 use bevy::prelude::*;
 
