@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# What scripts/fidelity and scripts/ladder share. Sourced after lib.sh, never run.
+# What scripts/fidelity, scripts/ladder and scripts/motion share. Sourced after lib.sh, never run.
 # shellcheck disable=SC2034,SC2154 # variables of lib.sh and of the scripts
 
 measure_options="  --no-install     install nothing; where something is missing, name it and exit with status 3

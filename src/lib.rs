@@ -19,13 +19,14 @@
 //! settings (resources)  ->  textures (baked on the GPU or loaded as assets)  ->  model: "what is at p?"
 //!                                                                                  |  one shader interface
 //!    per camera:      sky light -> march -> accumulate -> composite   <------------+
-//!                     (after the opaque scene and sky, before tone mapping)
+//!                     (after the opaque scene) -> drawn among transparent things, or over them
 //! ```
 //!
 //! | plugin | what it adds |
 //! |---|---|
 //! | settings | [`CloudModel`], [`CloudLighting`], [`CloudQuality`], [`CloudTextures`], [`CloudClock`]; checks; presets |
 //! | textures | noise volumes, cloud maps, blue noise; slots for your own |
+//! | phases | phase functions that are tables: computed, or your own |
 //! | model | the shader module that says where cloud is; [`ModelShader`] replaces it |
 //! | render | the passes of each camera with a [`CloudView`] |
 //!
@@ -35,10 +36,12 @@
 #[cfg(feature = "inspector")]
 pub mod inspector;
 mod model;
+pub mod phases;
 pub mod reference;
 mod render;
 pub mod settings;
 pub mod textures;
+pub mod weather;
 
 use bevy::{
     prelude::*,
@@ -50,26 +53,29 @@ use bevy::{
     shader::ShaderLoader,
 };
 
-pub use model::ModelShader;
+pub use model::{ModelShader, ModelShaderError};
+pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
 pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
 };
-pub use render::{CloudBuffer, CloudFrame, CloudNoise, CloudStatus};
+pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
-    CloudClock, CloudDebugView, CloudLighting, CloudModel, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots,
-    CloudTextures, CloudView,
+    CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
+    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, CloudWeather, CloudZone,
+    ModelPhases,
 };
 
 /// What most users need.
 pub mod prelude {
     pub use crate::{
-        CloudBuffer, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
+        CloudBuffer, CloudDepth, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
-            CloudClock, CloudDebugView, CloudLighting, CloudMethod, CloudModel, CloudPreset, CloudQuality,
-            CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion, Integration, MarchResolution,
-            PhaseFunction, TemporalMode, UpscaleBlock,
+            CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudMethod, CloudModel, CloudOrder,
+            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView,
+            CloudWeather, CloudZone, Erosion, Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
         },
+        weather::{WeatherMap, WeatherRecipe},
     };
 }
 
@@ -91,6 +97,7 @@ impl Plugin for CloudsPlugin {
             settings::CloudSettingsPlugin,
             textures::CloudTexturesPlugin,
             model::CloudModelPlugin,
+            phases::CloudPhasesPlugin,
             render::CloudRenderPlugin,
         ));
     }
@@ -124,7 +131,7 @@ fn missing_capability(world: &World) -> Option<String> {
     let limits = device.limits();
     for (what, has, needs) in [
         ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 3),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 1),
+        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 2),
         ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 128),
         ("max_bind_groups", limits.max_bind_groups, 3),
     ] {
@@ -132,13 +139,9 @@ fn missing_capability(world: &World) -> Option<String> {
             return Some(format!("{name}: {what} is {has}, and clouds need {needs}"));
         }
     }
-    for format in [
-        TextureFormat::Rgba8Unorm,
-        TextureFormat::Rgba16Float,
-        TextureFormat::Rgba32Float,
-        TextureFormat::Rg32Float,
-        TextureFormat::R32Uint,
-    ] {
+    for format in
+        [TextureFormat::Rgba8Unorm, TextureFormat::Rgba16Float, TextureFormat::Rgba32Float, TextureFormat::R32Uint]
+    {
         if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {
             return Some(format!("{name}: {format:?} cannot be a storage texture"));
         }

@@ -86,6 +86,7 @@ impl StartOptions {
     ) -> Result<CloudSettings> {
         let mut settings = CloudSettings {
             model: preset.model,
+            layers: preset.layers,
             lighting: preset.lighting,
             textures: preset.textures,
             clock,

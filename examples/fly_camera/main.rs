@@ -80,6 +80,7 @@ fn fly(options: &Options) -> Result<AppExit> {
         .add_plugins((FreeCameraPlugin, FrameTimeDiagnosticsPlugin::default(), RenderDiagnosticsPlugin))
         .add_plugins((CloudsPlugin, CloudInspectorPlugin))
         .insert_resource(settings.model)
+        .insert_resource(settings.layers)
         .insert_resource(settings.lighting)
         .insert_resource(settings.quality)
         .insert_resource(settings.textures)

@@ -22,7 +22,7 @@ use bevy::{
     window::ExitCondition,
     winit::WinitPlugin,
 };
-use bevy_cumulus::{CloudBuffer, CloudNoise, CloudStatus, prelude::*, textures::CloudTextureStatus};
+use bevy_cumulus::{CloudBuffer, CloudNoise, CloudPhaseStatus, CloudStatus, prelude::*, textures::CloudTextureStatus};
 use image::{RgbImage, Rgba32FImage};
 
 use crate::{
@@ -70,6 +70,7 @@ pub fn shoot_many(plans: &[Plan], mut done: impl FnMut(&Plan, &Shot) -> Result<(
     studio.make_ready(first, SETTLING_FRAMES)?;
     for plan in plans {
         set(studio.app.world_mut(), &plan.settings);
+        studio.expose(plan);
         studio.pose(plan, 0);
         studio.make_ready(plan, SETTLED_FRAMES)?;
         let timings = studio.count_frames(plan)?;
@@ -227,7 +228,7 @@ impl Studio {
             if let Some(reason) = status.unsupported() {
                 bail!("clouds cannot be drawn on this device: {reason}");
             }
-            let drawn = status.is_ready();
+            let drawn = status.is_ready() && !world.resource::<CloudPhaseStatus>().computing;
             stage.at((world.resource::<CloudTextureStatus>().progress * 100.0) as u64);
             let made = self.pipelines_made()?;
             settled = if drawn && made { settled + 1 } else { 0 };
@@ -291,6 +292,13 @@ impl Studio {
                 "the picture did not come back from the GPU within {} s",
                 BACK_WITHIN.as_secs()
             );
+        }
+    }
+
+    /// Exposes as the plan says.
+    fn expose(&mut self, plan: &Plan) {
+        if let Some(mut exposure) = self.app.world_mut().get_mut::<bevy::camera::Exposure>(self.camera) {
+            exposure.ev100 = plan.ev100;
         }
     }
 
@@ -365,6 +373,7 @@ impl Studio {
 fn set(world: &mut World, settings: &CloudSettings) {
     let settings = settings.clone();
     world.insert_resource(settings.model);
+    world.insert_resource(settings.layers);
     world.insert_resource(settings.lighting);
     world.insert_resource(settings.quality);
     world.insert_resource(settings.textures);

@@ -86,7 +86,14 @@ fn the_brightest_light_is_saved_as_the_sun() {
     let (moon, sun) = (light(0.3, 71.0), light(90_000.0, 12.34));
     let saved = |lights: &[(DirectionalLight, GlobalTransform)]| {
         let (model, lighting, textures) = default();
-        current(&model, &lighting, &textures, lights.iter().map(|(light, place)| (light, place))).sun_elevation
+        current(
+            &model,
+            &CloudLayers::default(),
+            &lighting,
+            &textures,
+            lights.iter().map(|(light, place)| (light, place)),
+        )
+        .sun_elevation
     };
     assert_eq!(saved(&[]), None);
     assert_eq!(saved(&[moon, sun, moon]), Some(12.34));

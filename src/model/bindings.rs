@@ -49,6 +49,10 @@ impl FromWorld for ModelBindings {
                         texture_2d(float),
                         sampler_layout(),
                         sampler_layout(),
+                        texture_3d(float),
+                        texture_3d(float),
+                        texture_2d_array(float),
+                        texture_2d(float),
                     ),
                 ),
             ),
@@ -83,6 +87,11 @@ impl ModelBindings {
                 views.gradient.as_ref()?,
                 &self.tiling,
                 &self.clamping,
+                // Nothing reads them before there is a layer.
+                views.shape.as_ref().or(views.billow.as_ref())?,
+                views.detail.as_ref().or(views.billow.as_ref())?,
+                views.weather.as_ref()?,
+                views.swirl.as_ref()?,
             )),
         ))
     }

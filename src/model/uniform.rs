@@ -6,9 +6,12 @@ use bevy::{
 };
 use glam::DVec2;
 
-use super::TangentFrame;
+use super::{
+    TangentFrame,
+    layers::{LayerSizes, LayerUniform, MAX_ZONES, ZoneUniform, decks},
+};
 use crate::{
-    settings::{CloudModel, Erosion},
+    settings::{CloudLayers, CloudModel, Erosion, MAX_LAYERS},
     textures::CloudTextureViews,
 };
 
@@ -22,6 +25,8 @@ pub(crate) struct TexelSizes {
     pub wisp: u32,
     pub coverage: u32,
     pub type_map: u32,
+    /// Of what weather-map layers read, once it is there.
+    pub layers: Option<LayerSizes>,
 }
 
 impl TexelSizes {
@@ -33,11 +38,27 @@ impl TexelSizes {
             wisp: width(&views.wisp)?,
             coverage: width(&views.coverage)?,
             type_map: width(&views.type_map)?,
+            layers: (|| {
+                Some(LayerSizes {
+                    shape: width(&views.shape)?,
+                    detail: width(&views.detail)?,
+                    weather: views.weather_size,
+                    maps: views.weather_layers,
+                })
+            })(),
         })
     }
 }
 
-/// `Model` of `model.wesl`, field for field. The CPU twin (`reference/field.rs`) reads the same numbers.
+/// What the uniform is made from.
+#[derive(Clone, Copy)]
+pub(crate) struct ModelSettings<'a> {
+    pub model: &'a CloudModel,
+    pub layers: &'a CloudLayers,
+    pub zones: &'a [ZoneUniform],
+}
+
+/// `Model` of `data.wesl`, field for field. The CPU twin (`reference/field.rs`) reads the same numbers.
 #[derive(ShaderType, Clone, Copy, Debug, Default)]
 pub(crate) struct ModelUniform {
     pub radius: f32,
@@ -69,14 +90,60 @@ pub(crate) struct ModelUniform {
     pub texels: Vec4,
     pub map_texels: Vec4,
     pub albedo: Vec4,
+    pub counts: UVec4,
+    pub decks: [Vec4; 5],
+    pub bounds: Vec4,
+    pub layers: [LayerUniform; MAX_LAYERS],
+    pub zones: [ZoneUniform; MAX_ZONES],
 }
 
 impl ModelUniform {
-    /// The model at cloud time `seconds`, seen from a frame.
-    pub fn new(model: &CloudModel, seconds: f64, frame: &TangentFrame, sizes: TexelSizes) -> Self {
+    /// The thesis's layer and the weather-map layers whose maps are there, at cloud time `seconds`, seen from a frame.
+    pub fn new(settings: &ModelSettings, seconds: f64, frame: &TangentFrame, sizes: TexelSizes) -> Self {
+        let own = Self::of_profile(settings.model, seconds, frame, sizes);
+        let maps = sizes.layers.map_or([false; MAX_LAYERS], |sizes| sizes.maps);
+        let shown = || settings.layers.shown().filter(|(i, _)| maps[*i]);
+        let phases = settings.layers.phases();
+        let mut layers = [LayerUniform::default(); MAX_LAYERS];
+        if let Some(sizes) = &sizes.layers {
+            for (slot, (i, layer)) in layers.iter_mut().zip(shown()) {
+                *slot = LayerUniform::new(layer, i, seconds, frame, sizes, &phases);
+            }
+        }
+        let ranges = decks(settings.model, shown().map(|(_, layer)| layer));
+        let mut packed = [Vec4::ZERO; 5];
+        for (i, range) in ranges.iter().enumerate() {
+            let half = if i % 2 == 0 { [0, 1] } else { [2, 3] };
+            packed[i / 2][half[0]] = range.x;
+            packed[i / 2][half[1]] = range.y;
+        }
+        let bounds = match (ranges.first(), ranges.last()) {
+            (Some(low), Some(high)) => Vec4::new(low.x, high.y, 0.0, 0.0),
+            _ => Vec4::new(1.0, 0.0, 0.0, 0.0),
+        };
+        let mut zones = [ZoneUniform::default(); MAX_ZONES];
+        for (slot, zone) in zones.iter_mut().zip(settings.zones) {
+            *slot = *zone;
+        }
+        Self {
+            counts: UVec4::new(
+                settings.model.enabled.into(),
+                shown().count() as u32,
+                ranges.len() as u32,
+                settings.zones.len().min(MAX_ZONES) as u32,
+            ),
+            decks: packed,
+            bounds,
+            layers,
+            zones,
+            ..own
+        }
+    }
+
+    fn of_profile(model: &CloudModel, seconds: f64, frame: &TangentFrame, sizes: TexelSizes) -> Self {
         let wind = DVec2::new(model.wind.x.into(), model.wind.z.into());
-        let rise = f64::from(model.wind.y + model.evolution) * seconds;
-        let map = frame.map - wind * seconds;
+        let rise = model.drift.y + f64::from(model.wind.y + model.evolution) * seconds;
+        let map = frame.map - DVec2::new(model.drift.x, model.drift.z) - wind * seconds;
         let turned = DVec2::new(0.8 * map.x - 0.6 * map.y, 0.6 * map.x + 0.8 * map.y);
         let group_scale = f64::from(model.map_scale) * GROUP_SCALE;
         let own = wrapped(map, model.map_scale.into());
@@ -133,6 +200,7 @@ impl ModelUniform {
                 0.0,
             ),
             albedo: model.albedo.extend(1.0),
+            ..default()
         }
     }
 }
@@ -145,7 +213,7 @@ impl ModelUniform {
 }
 
 /// Position in repeats of `scale`, wrapped to 0..1 in f64: exact after hours of wind, far from the origin.
-fn wrapped(metres: DVec2, scale: f64) -> Vec2 {
+pub(super) fn wrapped(metres: DVec2, scale: f64) -> Vec2 {
     let repeats = metres / scale;
     Vec2::new(repeats.x.rem_euclid(1.0) as f32, repeats.y.rem_euclid(1.0) as f32)
 }

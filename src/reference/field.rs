@@ -10,8 +10,8 @@ use super::{
     profile,
 };
 use crate::{
-    model::{ModelUniform, TangentFrame, TexelSizes},
-    settings::CloudModel,
+    model::{ModelSettings, ModelUniform, TangentFrame, TexelSizes},
+    settings::{CloudLayers, CloudModel},
 };
 
 /// Shares of the four octaves of a noise volume, as in the shader.
@@ -72,8 +72,9 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
     pub fn new(model: &CloudModel, seconds: f64, eye: DVec3, planet: Planet, textures: &'a T) -> Option<Self> {
         let frame = TangentFrame::below(eye + model.world_offset, planet.centre, planet.radius)?;
         let [billow, wisp, coverage, type_map] = textures.sides();
-        let sizes = TexelSizes { billow, wisp, coverage, type_map };
-        Some(Self { model: ModelUniform::new(model, seconds, &frame, sizes), frame, eye, textures })
+        let sizes = TexelSizes { billow, wisp, coverage, type_map, layers: None };
+        let settings = ModelSettings { model, layers: &CloudLayers::default(), zones: &[] };
+        Some(Self { model: ModelUniform::new(&settings, seconds, &frame, sizes), frame, eye, textures })
     }
 
     /// A point of the world (m) in the frame.

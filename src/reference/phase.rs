@@ -5,7 +5,7 @@
 
 use std::f64::consts::PI;
 
-use crate::settings::{CloudLighting, PhaseFunction, SettingsError};
+use crate::settings::{CloudLighting, CloudPhase, PhaseFunction, SettingsError};
 
 /// Least and greatest droplet diameter (µm) for which Jendersie & d'Eon give [`HgDraine`].
 pub const DROPLET_DIAMETERS: std::ops::RangeInclusive<f64> = 5.0..=50.0;
@@ -25,6 +25,26 @@ pub fn hg(g: f64, cos_theta: f64) -> f64 {
 /// `alpha` = 0 is Henyey–Greenstein, 1 is Cornette–Shanks, and 1 with `g` = 0 is Rayleigh.
 pub fn draine(g: f64, alpha: f64, cos_theta: f64) -> f64 {
     hg(g, cos_theta) * (1.0 + alpha * cos_theta * cos_theta) / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0)
+}
+
+/// `3 (1 + cos²θ) / 16π` (Costa 2.10 and Harris lack the 1/4π).
+pub fn rayleigh(cos_theta: f64) -> f64 {
+    draine(0.0, 1.0, cos_theta)
+}
+
+/// Cornette–Shanks, `3 (1 − g²)(1 + cos²θ) / (8π (2 + g²)(1 + g² − 2g cosθ)^1.5)` (Högfeldt 5.5 lacks 1/4π).
+pub fn cornette_shanks(g: f64, cos_theta: f64) -> f64 {
+    draine(g, 1.0, cos_theta)
+}
+
+/// Schlick, `(1 − k²) / (4π (1 − k cosθ)²)`, `k` in −1..1.
+pub fn schlick(k: f64, cos_theta: f64) -> f64 {
+    (1.0 - k * k) / (4.0 * PI * (1.0 - k * cos_theta).powi(2))
+}
+
+/// Schlick's k that stands for Henyey–Greenstein's g: `1.55g − 0.55g³`. It passes 1 at g = 0.94, and is held at 0.999.
+pub fn schlick_k(g: f64) -> f64 {
+    (1.55 * g - 0.55 * g.powi(3)).clamp(-0.999, 0.999)
 }
 
 /// `(1 − mix)·HG(g) + mix·HG(g_back)`, with `mix` in 0..=1.
@@ -77,6 +97,11 @@ impl HgDraine {
     }
 }
 
+/// Mean cosine of [`draine`] (Draine 2003, equation 6).
+fn draine_mean_cosine(g: f64, alpha: f64) -> f64 {
+    g * (1.0 + alpha * (3.0 + 2.0 * g * g) / 5.0) / (1.0 + alpha * (1.0 + 2.0 * g * g) / 3.0)
+}
+
 /// A phase function with its parameters.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub enum Phase {
@@ -98,6 +123,18 @@ pub enum Phase {
     },
     /// [`HgDraine::value`].
     HgDraine(HgDraine),
+    /// [`rayleigh`].
+    Rayleigh,
+    /// [`cornette_shanks`].
+    CornetteShanks {
+        /// Asymmetry (−1..1).
+        g: f64,
+    },
+    /// [`schlick`].
+    Schlick {
+        /// Schlick's k (−1..1).
+        k: f64,
+    },
 }
 
 impl Phase {
@@ -107,13 +144,28 @@ impl Phase {
     /// [`SettingsError::OutOfRange`] where [`PhaseFunction::HgDraine`] is chosen and the droplet diameter is outside
     /// [`DROPLET_DIAMETERS`].
     pub fn from_settings(lighting: &CloudLighting) -> Result<Self, SettingsError> {
-        Ok(match lighting.phase {
+        Self::of(&lighting.into())
+    }
+
+    /// The phase function of a layer. For those that are tables it is what stands in for them until they are there:
+    /// see [`PhaseFunction`].
+    ///
+    /// # Errors
+    /// As [`from_settings`](Self::from_settings).
+    pub fn of(phase: &CloudPhase) -> Result<Self, SettingsError> {
+        let g = f64::from(phase.g);
+        Ok(match phase.function {
             PhaseFunction::Isotropic => Self::Isotropic,
-            PhaseFunction::HenyeyGreenstein => Self::HenyeyGreenstein { g: lighting.g.into() },
-            PhaseFunction::TwoLobe => {
-                Self::TwoLobe { g: lighting.g.into(), g_back: lighting.g_back.into(), mix: lighting.lobe_mix.into() }
+            PhaseFunction::Rayleigh => Self::Rayleigh,
+            PhaseFunction::HenyeyGreenstein => Self::HenyeyGreenstein { g },
+            PhaseFunction::CornetteShanks => Self::CornetteShanks { g },
+            PhaseFunction::Schlick => Self::Schlick { k: schlick_k(g) },
+            PhaseFunction::TwoLobe => Self::TwoLobe { g, g_back: phase.g_back.into(), mix: phase.lobe_mix.into() },
+            PhaseFunction::HgDraine | PhaseFunction::Mie => {
+                Self::HgDraine(HgDraine::from_diameter(phase.droplet_diameter.into())?)
             }
-            PhaseFunction::HgDraine => Self::HgDraine(HgDraine::from_diameter(lighting.droplet_diameter.into())?),
+            PhaseFunction::Ice => Self::HgDraine(super::ice::stand_in()),
+            PhaseFunction::Table => Self::HenyeyGreenstein { g },
         })
     }
 
@@ -128,6 +180,9 @@ impl Phase {
             Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => {
                 HgDraine { g_hg: c * g_hg, g_d: c * g_d, alpha: c * alpha, w }.value(cos_theta)
             }
+            Self::Rayleigh => draine(0.0, c, cos_theta),
+            Self::CornetteShanks { g } => draine(c * g, c, cos_theta),
+            Self::Schlick { k } => schlick(c * k, cos_theta),
         }
     }
 
@@ -137,12 +192,20 @@ impl Phase {
             Self::Isotropic => 0.0,
             Self::HenyeyGreenstein { g } => g,
             Self::TwoLobe { g, g_back, mix } => (1.0 - mix) * g + mix * g_back,
-            Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => {
-                // Draine 2003, equation 6.
-                let draine =
-                    g_d * (1.0 + alpha * (3.0 + 2.0 * g_d * g_d) / 5.0) / (1.0 + alpha * (1.0 + 2.0 * g_d * g_d) / 3.0);
-                (1.0 - w) * g_hg + w * draine
-            }
+            Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => (1.0 - w) * g_hg + w * draine_mean_cosine(g_d, alpha),
+            Self::Rayleigh => 0.0,
+            Self::CornetteShanks { g } => draine_mean_cosine(g, 1.0),
+            // The closed form below cancels near 0, where the mean is ⅔k.
+            Self::Schlick { k } if k.abs() < 1e-3 => 2.0 / 3.0 * k,
+            Self::Schlick { k } => 1.0 / k - (1.0 - k * k) / (2.0 * k * k) * ((1.0 + k) / (1.0 - k)).ln(),
+        }
+    }
+
+    /// Share of the light that a forward peak of a degree or so takes, and that hardly turns: 0 where there is none.
+    pub fn peak_share(&self) -> f64 {
+        match self {
+            Self::HgDraine(droplets) => 1.0 - droplets.w,
+            _ => 0.0,
         }
     }
 
@@ -153,6 +216,9 @@ impl Phase {
             Self::HenyeyGreenstein { g } => (1, [g, 0.0, 0.0, 0.0]),
             Self::TwoLobe { g, g_back, mix } => (2, [g, g_back, mix, 0.0]),
             Self::HgDraine(HgDraine { g_hg, g_d, alpha, w }) => (3, [g_hg, g_d, alpha, w]),
+            Self::Rayleigh => (4, [0.0; 4]),
+            Self::CornetteShanks { g } => (5, [g, 0.0, 0.0, 0.0]),
+            Self::Schlick { k } => (6, [k, 0.0, 0.0, 0.0]),
         };
         (kind, params.map(|p| p as f32))
     }

@@ -21,6 +21,7 @@ use bevy::{
 use super::{
     StatusFlags,
     history::CloudHistory,
+    phase_slots::PhaseTableBuffer,
     pipelines::{CloudPipelines, SKY_LIGHT_BYTES, Variant},
     view::{CloudUniforms, ExtractedCloudView},
 };
@@ -36,8 +37,11 @@ pub(crate) struct CloudBindGroups {
     pub model: BindGroup,
     pub sky: (CachedComputePipelineId, BindGroup),
     pub light: Light,
-    pub composite: (CachedRenderPipelineId, BindGroup),
+    pub composite: (CachedComputePipelineId, BindGroup),
+    pub draw: (CachedRenderPipelineId, BindGroup),
+    /// For the app: the picture, and where the clouds are.
     pub publish: Option<(CachedComputePipelineId, BindGroup)>,
+    pub depth: Option<(CachedComputePipelineId, BindGroup)>,
 }
 
 /// How the cloud's light is found.
@@ -110,12 +114,14 @@ pub(crate) fn prepare_bind_groups(
     textures: Res<CloudTextureViews>,
     images: Res<RenderAssets<GpuImage>>,
     model: Res<ModelBindings>,
+    phase_tables: Res<PhaseTableBuffer>,
     mut pipelines: ResMut<CloudPipelines>,
     cache: Res<PipelineCache>,
     device: Res<RenderDevice>,
     status: Res<StatusFlags>,
 ) {
-    let mut ready = !views.is_empty();
+    // What layers read comes after what the thesis's layer does.
+    let mut ready = !views.is_empty() && !textures.maps_pending && !(textures.bake_pending && textures.shape.is_none());
     for item in &views {
         let own;
         let sky_light = match item.sky_light {
@@ -138,6 +144,7 @@ pub(crate) fn prepare_bind_groups(
             &textures,
             &images,
             &model,
+            &phase_tables.buffer,
             &mut pipelines,
             &cache,
             &device,
@@ -163,6 +170,7 @@ fn view_bind_groups(
     textures: &CloudTextureViews,
     images: &RenderAssets<GpuImage>,
     model: &ModelBindings,
+    phase_tables: &Buffer,
     pipelines: &mut CloudPipelines,
     cache: &PipelineCache,
     device: &RenderDevice,
@@ -178,6 +186,7 @@ fn view_bind_groups(
     let variant = Variant {
         atmosphere: air.is_some(),
         multisampled,
+        drawn_into: item.cloud.drawn_into(*item.msaa),
         target: item.view.target_format,
         debug: item.cloud.debug.shader(),
         path_traced: item.cloud.is_path_traced(),
@@ -210,6 +219,7 @@ fn view_bind_groups(
                 history.sum_after(),
                 marched_after,
                 &history.distances,
+                history.marched_distances(),
             ));
             (ids.blend, group("cloud_blend", &pipelines.blend[ms], &entries))
         }
@@ -243,6 +253,7 @@ fn view_bind_groups(
                         history.marched_before(),
                         history.marched_now(),
                         held.clone(),
+                        phase_tables.as_entire_binding(),
                     )),
                 ),
             ),
@@ -250,15 +261,16 @@ fn view_bind_groups(
         },
         Some([trace, noise]) => {
             let [before, after] = history.moments()?;
-            let entries = BindGroupEntries::sequential((
-                frame.clone(),
-                history.sum_before(),
-                before,
-                depth,
-                history.sum_after(),
-                &history.distances,
-                world_from_local.clone(),
-                after,
+            let entries = BindGroupEntries::with_indices((
+                (0, frame.clone()),
+                (1, history.sum_before()),
+                (2, before),
+                (3, depth),
+                (4, history.sum_after()),
+                (5, &history.distances),
+                (6, world_from_local.clone()),
+                (7, after),
+                (10, phase_tables.as_entire_binding()),
             ));
             let image = item.cloud.noise.and_then(|id| images.get(id));
             Light::PathTrace {
@@ -271,17 +283,13 @@ fn view_bind_groups(
             }
         }
     };
-    let resolved = BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth));
-    let publish = item.cloud.buffer.and_then(|id| images.get(id)).map(|image| {
-        let entries = BindGroupEntries::sequential((
-            frame.clone(),
-            history.sum_after(),
-            &history.distances,
-            depth,
-            &image.texture_view,
-        ));
-        (ids.publish, group("cloud_publish", &pipelines.publish[ms], &entries))
-    });
+    let full_size = |id, label, layout: &[BindGroupLayoutDescriptor; 2], written: &TextureView| {
+        let entries =
+            BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth, written));
+        (id, group(label, &layout[ms], &entries))
+    };
+    let handed_out = |image: Option<AssetId<Image>>| image.and_then(|id| images.get(id));
+    let draw = BindGroupEntries::sequential((frame.clone(), &history.resolved));
     let groups = CloudBindGroups {
         model: model.bind_group(device, cache, &item.uniforms.model, textures)?,
         sky: (
@@ -289,12 +297,16 @@ fn view_bind_groups(
             group(
                 "cloud_sky",
                 &pipelines.sky,
-                &BindGroupEntries::sequential((frame, sky_light.as_entire_binding(), world_from_local)),
+                &BindGroupEntries::sequential((frame.clone(), sky_light.as_entire_binding(), world_from_local)),
             ),
         ),
         light,
-        composite: (ids.composite, group("cloud_composite", &pipelines.composite[ms], &resolved)),
-        publish,
+        composite: full_size(ids.composite, "cloud_composite", &pipelines.composite, &history.resolved),
+        draw: (ids.draw, group("cloud_draw", &pipelines.draw, &draw)),
+        publish: handed_out(item.cloud.buffer)
+            .map(|image| full_size(ids.publish, "cloud_publish", &pipelines.publish, &image.texture_view)),
+        depth: handed_out(item.cloud.depth)
+            .map(|image| full_size(ids.depth, "cloud_depth", &pipelines.composite, &image.texture_view)),
         air,
         air_offsets,
         empty,

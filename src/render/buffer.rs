@@ -29,10 +29,39 @@ impl CloudBuffer {
     }
 }
 
+/// On a camera with [`CloudView`](crate::CloudView): every frame, before anything transparent is drawn, where the clouds
+/// are is written into this image, so that particles, water and fog can fade into them.
+///
+/// R is transmittance (1 where there is no cloud before the opaque scene), G the clouds' mean distance, weighted by
+/// opacity, B the distance at which they begin, both in kilometres (65 504 where there are none); A is 1. One texel a
+/// pixel of the view, from its top left; pixels past the image's or the view's edge are left alone. Costs one full-size
+/// pass. Make the image with [`CloudDepth::image`].
+///
+/// A material binds it as any other texture and asks the module `fade` how much of the cloud is before a fragment:
+/// ```wgsl
+/// import bevy_pbr::render::{forward_io::VertexOutput, mesh_view_bindings::view};
+/// import bevy_cumulus::render::composite::fade::cloud_fade;
+///
+/// let pixel = vec2<i32>(mesh.position.xy - view.viewport.xy);
+/// let distance = length(mesh.world_position.xyz - view.world_position);
+/// color.a *= cloud_fade(textureLoad(clouds, pixel, 0), distance);
+/// ```
+/// `examples/cloud_depth.rs` is a whole one.
+#[derive(Component, Reflect, Clone, Debug)]
+#[reflect(Component, Clone)]
+pub struct CloudDepth(pub Handle<Image>);
+
+impl CloudDepth {
+    /// An image of this size (px) that the clouds' depth can be written to: `Rgba16Float`, which may be filtered.
+    pub fn image(width: u32, height: u32) -> Image {
+        blank(width, height, TextureFormat::Rgba16Float, TextureUsages::STORAGE_BINDING)
+    }
+}
+
 /// On a camera with [`CloudView`](crate::CloudView): every frame the newest marched frame, as the sliding window stores
 /// it, is copied into this image's top left.
 ///
-/// RGB is radiance times the exposure when the history began, A transmittance, at the marched size (the view's divided
+/// RGB is radiance times the camera's exposure, A transmittance, at the marched size (the view's divided
 /// by 1, 2 or 4, rounded up). For looking at single frames; make the image with [`CloudFrame::image`].
 #[derive(Component, Reflect, Clone, Debug)]
 #[reflect(Component, Clone)]
@@ -109,6 +138,7 @@ pub(crate) fn refuse_unfit_images(
     for mut view in &mut views {
         let view = &mut *view;
         check(&mut view.buffer, "CloudBuffer", TextureFormat::Rgba32Float, TextureUsages::STORAGE_BINDING);
+        check(&mut view.depth, "CloudDepth", TextureFormat::Rgba16Float, TextureUsages::STORAGE_BINDING);
         check(&mut view.noise, "CloudNoise", TextureFormat::Rgba32Float, TextureUsages::STORAGE_BINDING);
         check(&mut view.frame, "CloudFrame", TextureFormat::Rgba16Float, TextureUsages::COPY_DST);
     }

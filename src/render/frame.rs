@@ -2,10 +2,12 @@
 
 use bevy::{prelude::*, render::render_resource::ShaderType};
 
-use super::history::FrameInWindow;
+use super::{
+    history::FrameInWindow,
+    phase_slots::{PHASE_SLOTS, PhaseSlots, diffuses},
+};
 use crate::{
     model::TangentFrame,
-    reference::phase::Phase,
     settings::{CloudDebugView, CloudLighting, CloudQuality, Integration},
     textures::n_rooks::{MAX_WINDOW, n_rooks},
 };
@@ -31,6 +33,9 @@ pub(crate) struct FrameInput<'a> {
     pub exposure: f32,
     pub quality: &'a CloudQuality,
     pub lighting: &'a CloudLighting,
+    /// Distance at which high layers pass below the horizon (m): they are never cut off before it.
+    pub highest_horizon: f32,
+    pub phases: &'a PhaseSlots,
     pub window: FrameInWindow,
     pub debug: CloudDebugView,
 }
@@ -42,7 +47,11 @@ pub(crate) struct FrameUniform {
     local_from_view: Mat4,
     sun_direction: Vec4,
     sun_illuminance: Vec4,
-    phase_params: Vec4,
+    phase_params: [Vec4; PHASE_SLOTS],
+    phase_kinds: UVec4,
+    phase_fall: Vec4,
+    first_thinning: Vec4,
+    first_eccentricity: Vec4,
     octave_factors: Vec4,
     diffusion: Vec4,
     ambient: Vec4,
@@ -74,31 +83,32 @@ pub(crate) fn texel_angle(clip_from_view: Mat4, viewport: UVec4, quality: &Cloud
 
 impl FrameUniform {
     pub fn new(input: &FrameInput) -> Self {
-        let FrameInput { space, sun, quality, lighting, window, viewport, .. } = input;
+        let FrameInput { space, sun, quality, lighting, phases, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();
         let size = marched_size(*viewport, quality);
-        let reach = reach(quality, lighting, space);
-        // Settings are validated before they get here, so the fallback is never seen.
-        let phase = Phase::from_settings(lighting).unwrap_or(Phase::Isotropic);
-        let (kind, phase_params) = phase.shader_parameters();
-        let [diffuse @ .., first_eccentricity] = diffusion(lighting, &phase);
+        let reach = reach(quality, lighting, space).max(input.highest_horizon);
+        let [first_thinning, first_eccentricity] = phases.first_octave(lighting);
         let held = if quality.is_path_traced() { window.index + 1 } else { window.held_after() };
         Self {
             view_from_clip: input.clip_from_view.inverse(),
             local_from_view: Mat4::from_quat(local_from_world * input.world_from_view),
             sun_direction: (local_from_world * sun.direction).extend(sun.angular_size),
             sun_illuminance: (sun.illuminance * lighting.sun_strength).extend(0.0),
-            phase_params: phase_params.into(),
+            phase_params: phases.params(),
+            phase_kinds: phases.kinds(),
+            phase_fall: phases.fall(),
+            first_thinning,
+            first_eccentricity,
             octave_factors: Vec4::new(
                 lighting.attenuation,
                 lighting.contribution,
                 lighting.eccentricity,
                 lighting.phase_limit,
             ),
-            diffusion: diffuse.into(),
+            diffusion: diffusion(lighting),
             ambient: (lighting.ambient_tint * lighting.ambient_strength).extend(lighting.powder),
             ground_albedo: lighting.ground_albedo.extend(0.0),
-            sky_fallback: lighting.sky_fallback.extend(first_eccentricity),
+            sky_fallback: lighting.sky_fallback.extend(0.0),
             steps: Vec4::new(quality.step, quality.step_growth, quality.light_step, quality.light_growth),
             limits: Vec4::new(
                 quality.transmittance_stop,
@@ -122,7 +132,7 @@ impl FrameUniform {
             ),
             size: UVec4::new(size.x, size.y, quality.divisor(), window.index & 255),
             viewport: *viewport,
-            counts: UVec4::new(quality.max_steps, quality.light_steps, lighting.octaves, kind),
+            counts: UVec4::new(quality.max_steps, quality.light_steps, lighting.octaves, phases.count()),
             flags: UVec4::new(
                 quality.long_step,
                 quality.empty_steps,
@@ -133,7 +143,7 @@ impl FrameUniform {
                 quality.offsets.into(),
             ),
             layers: UVec4::new(window.layer(), window.leaving_layer(), window.layers(), window.held_before),
-            debug: UVec4::new(input.debug.shader_mode(), window.index, quality.seed, 0),
+            debug: UVec4::new(input.debug.shader_mode(), window.index, quality.seed, phases.is_coloured().into()),
         }
     }
 }
@@ -172,20 +182,9 @@ fn van_der_corput(i: u32) -> f32 {
     (i.reverse_bits() >> 16) as f32 / 65_536.0
 }
 
-/// Strength, fall with optical depth and asymmetry of the diffuse light, and factors on optical depth and asymmetry of
-/// the first octave. Single scattering alone (one octave), or the octaves alone (no diffusion), are the thesis's.
-fn diffusion(lighting: &CloudLighting, phase: &Phase) -> [f32; 5] {
-    let fall = 0.75 * (1.0 - phase.mean_cosine() as f32);
-    if lighting.octaves <= 1 || lighting.diffusion == 0.0 {
-        return [0.0, fall, 0.0, 1.0, 1.0];
-    }
-    // Light in the diffraction peak hardly turns: it reaches deeper, and leaves a little wider. Both shares are fitted to
-    // the path tracer.
-    let peak = match phase {
-        Phase::HgDraine(droplets) => 1.0 - droplets.w as f32,
-        _ => 0.0,
-    };
-    [lighting.diffusion, fall, lighting.diffusion_asymmetry, 1.0 - 0.6 * peak, 1.0 - 0.02 * peak]
+/// Strength and asymmetry of the diffuse light, as `frame.wesl` has them.
+fn diffusion(lighting: &CloudLighting) -> Vec4 {
+    if diffuses(lighting) { Vec4::new(lighting.diffusion, 0.0, lighting.diffusion_asymmetry, 0.0) } else { Vec4::ZERO }
 }
 
 #[cfg(test)]

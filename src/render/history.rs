@@ -8,7 +8,10 @@ use bevy::{
     render::{render_resource::*, renderer::RenderDevice},
 };
 
-use super::reproject::{HeldUniform, Pose, Sparse};
+use super::{
+    reproject::{HeldUniform, Pose, Sparse},
+    versions::Versions,
+};
 
 /// Where the coming frame stands in the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +22,7 @@ pub(crate) struct FrameInWindow {
     pub window: u32,
     /// Frames held before this one, at most `window`.
     pub held_before: u32,
-    /// Exposure that the stored radiance is multiplied with.
+    /// Exposure that the picture's radiance is multiplied with; each frame's is with that of its own.
     pub exposure: f32,
 }
 
@@ -49,8 +52,7 @@ pub(crate) struct HistoryKey {
     pub viewport: UVec4,
     pub window: u32,
     pub reset: u32,
-    pub settings: u64,
-    pub textures: u64,
+    pub versions: Versions,
     pub quality: crate::settings::CloudQuality,
     pub debug: crate::settings::CloudDebugView,
     pub atmosphere: bool,
@@ -84,18 +86,20 @@ pub(crate) struct CloudHistory {
     carried: Option<Carried>,
     /// Of the path tracer's samples.
     moments: Option<[TextureView; 2]>,
-    /// Mean cloud distance and marched limit (m) of the newest frame.
+    /// Mean cloud distance, marched limit and where cloud begins (m), in the newest frame.
     pub distances: TextureView,
+    /// The picture at the viewport's size, as it is blended over the scene.
+    pub resolved: TextureView,
 }
 
 impl CloudHistory {
     /// A new, empty history.
     pub fn new(device: &RenderDevice, key: HistoryKey, pose: Pose) -> Self {
         let frame = FrameInWindow { index: 0, window: key.window, held_before: 0, exposure: pose.exposure };
-        let texture = |label, format, layers| {
+        let sized = |label, format, layers, size: UVec2| {
             device.create_texture(&TextureDescriptor {
                 label: Some(label),
-                size: Extent3d { width: key.size.x, height: key.size.y, depth_or_array_layers: layers },
+                size: Extent3d { width: size.x, height: size.y, depth_or_array_layers: layers },
                 mip_level_count: 1,
                 sample_count: 1,
                 dimension: TextureDimension::D2,
@@ -104,6 +108,7 @@ impl CloudHistory {
                 view_formats: &[],
             })
         };
+        let texture = |label, format, layers| sized(label, format, layers, key.size);
         let frames = texture("cloud_frames", TextureFormat::Rgba16Float, frame.layers());
         let marched = texture("cloud_marched", TextureFormat::R32Uint, frame.layers());
         let whole = |t: Texture| t.create_view(&TextureViewDescriptor::default());
@@ -120,10 +125,11 @@ impl CloudHistory {
                 .quality
                 .is_path_traced()
                 .then(|| [0, 1].map(|_| whole(texture("cloud_path_moments", TextureFormat::Rgba32Float, 1)))),
-            distances: whole(texture("cloud_distances", TextureFormat::Rg32Float, 1)),
+            distances: whole(texture("cloud_distances", TextureFormat::Rgba32Float, 1)),
+            resolved: whole(sized("cloud_resolved", TextureFormat::Rgba16Float, 1, key.viewport.zw())),
             carried: key.quality.carries_picture().then(|| Carried {
                 marched: [0, 1].map(|_| whole(texture("cloud_picture_marched", TextureFormat::R32Uint, 1))),
-                scratch: whole(texture("cloud_scratch", TextureFormat::Rg32Float, 1)),
+                scratch: whole(texture("cloud_scratch", TextureFormat::Rgba32Float, 1)),
             }),
             frames,
             key,
@@ -137,20 +143,24 @@ impl CloudHistory {
         let path_traced = key.quality.is_path_traced();
         let same_textures =
             path_traced == self.moments.is_some() && key.quality.carries_picture() == self.carried.is_some();
-        if key.size != self.key.size || key.window != self.key.window || !same_textures {
+        let same_size = key.size == self.key.size && key.viewport.zw() == self.key.viewport.zw();
+        if !same_size || key.window != self.key.window || !same_textures {
             *self = Self::new(device, key, pose);
             return;
         }
-        let exposed = pose.exposure / self.frame.exposure;
+        let exposed = pose.exposure / self.pose.exposure;
         // Path-traced frames add up without end: nothing may move at all.
         let goes_on = if path_traced { pose.stands_still(&self.pose, f32::MAX) } else { !pose.is_cut(&self.pose) };
-        let keep = drawn && key == self.key && (0.25..4.0).contains(&exposed) && goes_on;
+        // Frames are half floats: what was stored a thousand times too dark has no digits left.
+        let keep = drawn && key == self.key && (1e-3..1e3).contains(&exposed) && goes_on;
         self.frame = if keep {
             self.held.push_front(self.pose);
             self.held.truncate(key.window as usize);
             FrameInWindow {
                 index: self.frame.index.wrapping_add(1),
                 held_before: self.frame.held_after(),
+                // A sum without end is of floats that hold any exposure.
+                exposure: if path_traced { self.frame.exposure } else { pose.exposure },
                 ..self.frame
             }
         } else {

@@ -1,6 +1,7 @@
 //! The stages of a frame, as systems in `Core3d`.
 
 use bevy::{
+    camera::{MainPassResolutionOverride, Viewport},
     prelude::*,
     render::{
         camera::ExtractedCamera,
@@ -18,6 +19,7 @@ use super::{
     history::CloudHistory,
     view::ExtractedCloudView,
 };
+use crate::settings::CloudOrder;
 
 /// Texels along one side of a workgroup.
 const GROUP: u32 = 8;
@@ -81,7 +83,7 @@ pub(crate) fn cloud_light(
     );
 }
 
-/// Adds the newest frame, takes away the oldest; then hands out what was asked for.
+/// Adds the newest frame, takes away the oldest.
 pub(crate) fn cloud_accumulate(
     view: ViewQuery<(&CloudBindGroups, &CloudHistory, &ExtractedCloudView)>,
     images: Res<RenderAssets<GpuImage>>,
@@ -99,15 +101,6 @@ pub(crate) fn cloud_accumulate(
         let groups = [empty, empty, (own, &[][..])];
         dispatch(&mut ctx, label, cache.get_compute_pipeline(*id), groups, workgroups(history.size()));
     }
-    if let Some((id, own)) = &groups.publish {
-        dispatch(
-            &mut ctx,
-            "cloud_publish",
-            cache.get_compute_pipeline(*id),
-            [empty, empty, (own, &[])],
-            workgroups(history.viewport_size()),
-        );
-    }
     if let Some(image) = cloud.frame.and_then(|id| images.get(id)) {
         let room = history.size().min(UVec2::new(image.texture.width(), image.texture.height()));
         ctx.command_encoder().copy_texture_to_texture(
@@ -118,19 +111,49 @@ pub(crate) fn cloud_accumulate(
     }
 }
 
-/// Blends the clouds over the view's colour.
+/// The picture at the view's size, and what the app asked for.
 pub(crate) fn cloud_composite(
-    view: ViewQuery<(&CloudBindGroups, &ViewTarget, &ExtractedCamera)>,
+    view: ViewQuery<(&CloudBindGroups, &CloudHistory)>,
     cache: Res<PipelineCache>,
     mut ctx: RenderContext,
 ) {
-    let (groups, target, camera) = view.into_inner();
-    let (id, own) = &groups.composite;
+    let (groups, history) = view.into_inner();
+    let empty = (&groups.empty, &[][..]);
+    let stages = [
+        ("cloud_composite", Some(&groups.composite)),
+        ("cloud_publish", groups.publish.as_ref()),
+        ("cloud_depth", groups.depth.as_ref()),
+    ];
+    for (label, stage) in stages {
+        let Some((id, own)) = stage else { continue };
+        let size = workgroups(history.viewport_size());
+        dispatch(&mut ctx, label, cache.get_compute_pipeline(*id), [empty, empty, (own, &[])], size);
+    }
+}
+
+/// Draws the clouds over everything where that is the view's order: past TAA, since cloud has a history of its own and
+/// TAA would reproject it as the sky it covers; but before, where the scene is to be enlarged there.
+pub(crate) fn cloud_draw_over<const LATE: bool>(
+    view: ViewQuery<(
+        &CloudBindGroups,
+        &ViewTarget,
+        &ExtractedCamera,
+        &ExtractedCloudView,
+        Option<&MainPassResolutionOverride>,
+    )>,
+    cache: Res<PipelineCache>,
+    mut ctx: RenderContext,
+) {
+    let (groups, target, camera, cloud, small) = view.into_inner();
+    let (id, own) = &groups.draw;
     let Some(pipeline) = cache.get_render_pipeline(*id) else { return };
+    if cloud.order != CloudOrder::AfterTransparent || LATE == small.is_some() {
+        return;
+    }
     let diagnostics = ctx.diagnostic_recorder();
     let diagnostics = diagnostics.as_deref();
     let mut pass = ctx.begin_tracked_render_pass(RenderPassDescriptor {
-        label: Some("cloud_composite"),
+        label: Some("cloud_draw"),
         color_attachments: &[Some(RenderPassColorAttachment {
             view: target.main_texture_view(),
             depth_slice: None,
@@ -142,9 +165,9 @@ pub(crate) fn cloud_composite(
         occlusion_query_set: None,
         multiview_mask: None,
     });
-    let span = diagnostics.pass_span(&mut pass, "cloud_composite");
-    if let Some(viewport) = &camera.viewport {
-        pass.set_camera_viewport(viewport);
+    let span = diagnostics.pass_span(&mut pass, "cloud_draw");
+    if let Some(viewport) = Viewport::from_viewport_and_override(camera.viewport.as_ref(), small) {
+        pass.set_camera_viewport(&viewport);
     }
     pass.set_render_pipeline(pipeline);
     pass.set_bind_group(0, &groups.empty, &[]);

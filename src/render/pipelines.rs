@@ -4,7 +4,7 @@ use std::num::NonZeroU64;
 
 use bevy::{
     asset::load_embedded_asset,
-    core_pipeline::FullscreenShader,
+    core_pipeline::{FullscreenShader, core_3d::CORE_3D_DEPTH_FORMAT},
     pbr::{
         GpuAtmosphereSettings,
         resources::{AtmosphereTransform, GpuAtmosphere},
@@ -14,14 +14,25 @@ use bevy::{
     render::render_resource::{binding_types::*, *},
 };
 
-use super::{frame::FrameUniform, reproject::HeldUniform};
+use super::{frame::FrameUniform, phase_slots::phase_tables_layout, reproject::HeldUniform};
 use crate::{model::ModelBindings, reference::path_tracer::PathTracer, settings::DebugShader};
+
+/// What clouds are drawn into.
+#[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
+pub(crate) enum DrawnInto {
+    /// The pass of transparent things, with so many samples and a depth buffer.
+    TransparentPass(u32),
+    /// The view's colour alone.
+    Colour,
+}
 
 /// What a stage's pipeline depends on.
 #[derive(Clone, Copy, PartialEq, Eq, Hash, Debug)]
 pub(crate) struct Variant {
     pub atmosphere: bool,
     pub multisampled: bool,
+    /// Samples of what clouds are drawn into, and whether it has a depth buffer: among transparent things.
+    pub drawn_into: DrawnInto,
     pub target: TextureFormat,
     pub debug: DebugShader,
     pub path_traced: bool,
@@ -49,8 +60,10 @@ pub(crate) struct Pipelines {
     pub plain_march: CachedComputePipelineId,
     pub accumulate: CachedComputePipelineId,
     pub blend: CachedComputePipelineId,
-    pub composite: CachedRenderPipelineId,
+    pub composite: CachedComputePipelineId,
+    pub draw: CachedRenderPipelineId,
     pub publish: CachedComputePipelineId,
+    pub depth: CachedComputePipelineId,
     /// The path tracer and its noise, where they were asked for.
     pub traced: Option<[CachedComputePipelineId; 2]>,
 }
@@ -65,9 +78,10 @@ pub(crate) struct CloudPipelines {
     pub accumulate: BindGroupLayoutDescriptor,
     pub blend: [BindGroupLayoutDescriptor; 2],
     pub composite: [BindGroupLayoutDescriptor; 2],
+    pub draw: BindGroupLayoutDescriptor,
     pub publish: [BindGroupLayoutDescriptor; 2],
     pub path_tracer: PathTracer,
-    shaders: [Handle<Shader>; 6],
+    shaders: [Handle<Shader>; 8],
     fullscreen: FullscreenShader,
     made: HashMap<Variant, Pipelines>,
 }
@@ -98,11 +112,12 @@ impl FromWorld for CloudPipelines {
                         texture_2d(unfiltered),
                         depth_layout(multisampled),
                         write(TextureFormat::Rgba16Float),
-                        write(TextureFormat::Rg32Float),
+                        write(TextureFormat::Rgba32Float),
                         uniform_buffer::<Mat4>(false),
                         texture_2d(TextureSampleType::Uint),
                         write(TextureFormat::R32Uint),
                         uniform_buffer::<HeldUniform>(false),
+                        phase_tables_layout(),
                     ),
                 ),
             )
@@ -122,23 +137,16 @@ impl FromWorld for CloudPipelines {
                         texture_2d(TextureSampleType::Uint),
                         write(TextureFormat::Rgba32Float),
                         write(TextureFormat::R32Uint),
-                        write(TextureFormat::Rg32Float),
+                        write(TextureFormat::Rgba32Float),
+                        texture_2d(unfiltered),
                     ),
                 ),
             )
         };
-        let composite = |multisampled| {
+        // Three stages at the view's size differ in what they write.
+        let full_size = |label, multisampled, format| {
             BindGroupLayoutDescriptor::new(
-                "cloud_composite",
-                &BindGroupLayoutEntries::sequential(
-                    ShaderStages::FRAGMENT,
-                    (frame(), texture_2d(unfiltered), texture_2d(unfiltered), depth_layout(multisampled)),
-                ),
-            )
-        };
-        let publish = |multisampled| {
-            BindGroupLayoutDescriptor::new(
-                "cloud_publish",
+                label,
                 &BindGroupLayoutEntries::sequential(
                     compute,
                     (
@@ -146,11 +154,13 @@ impl FromWorld for CloudPipelines {
                         texture_2d(unfiltered),
                         texture_2d(unfiltered),
                         depth_layout(multisampled),
-                        write(TextureFormat::Rgba32Float),
+                        write(format),
                     ),
                 ),
             )
         };
+        let composite = |multisampled| full_size("cloud_composite", multisampled, TextureFormat::Rgba16Float);
+        let publish = |multisampled| full_size("cloud_publish", multisampled, TextureFormat::Rgba32Float);
         Self {
             empty: BindGroupLayoutDescriptor::new("cloud_empty", &[]),
             // Binding numbers are Bevy's, so that its atmosphere's own functions can be imported.
@@ -193,6 +203,10 @@ impl FromWorld for CloudPipelines {
             ),
             blend: [blend(false), blend(true)],
             composite: [composite(false), composite(true)],
+            draw: BindGroupLayoutDescriptor::new(
+                "cloud_draw",
+                &BindGroupLayoutEntries::sequential(ShaderStages::FRAGMENT, (frame(), texture_2d(unfiltered))),
+            ),
             publish: [publish(false), publish(true)],
             shaders: [
                 load_embedded_asset!(world, "sky/sky.wesl"),
@@ -201,6 +215,8 @@ impl FromWorld for CloudPipelines {
                 load_embedded_asset!(world, "composite/composite.wesl"),
                 load_embedded_asset!(world, "composite/publish.wesl"),
                 load_embedded_asset!(world, "accumulate/blend.wesl"),
+                load_embedded_asset!(world, "composite/draw.wesl"),
+                load_embedded_asset!(world, "composite/depth.wesl"),
             ],
             path_tracer: PathTracer::from_world(world),
             fullscreen: world.resource::<FullscreenShader>().clone(),
@@ -248,6 +264,25 @@ impl CloudPipelines {
             self.made.insert(variant, made);
             return made;
         }
+        let march = compute("cloud_march", 1, [air, &model.layout, &self.march[ms]]);
+        let made = Pipelines {
+            sky: compute("cloud_sky", 0, [air, &model.layout, &self.sky]),
+            march,
+            plain_march: march,
+            accumulate: compute("cloud_accumulate", 2, [&self.empty, &self.empty, &self.accumulate]),
+            blend: compute("cloud_blend", 5, [&self.empty, &self.empty, &self.blend[ms]]),
+            composite: compute("cloud_composite", 3, [&self.empty, &self.empty, &self.composite[ms]]),
+            draw: cache.queue_render_pipeline(self.draw_pipeline(variant)),
+            publish: compute("cloud_publish", 4, [&self.empty, &self.empty, &self.publish[ms]]),
+            depth: compute("cloud_depth", 7, [&self.empty, &self.empty, &self.composite[ms]]),
+            traced: None,
+        };
+        self.made.insert(variant, made);
+        made
+    }
+
+    /// Blends the picture over what is drawn already.
+    fn draw_pipeline(&self, variant: Variant) -> RenderPipelineDescriptor {
         let premultiplied = BlendState {
             color: BlendComponent {
                 src_factor: BlendFactor::One,
@@ -260,13 +295,28 @@ impl CloudPipelines {
                 operation: BlendOperation::Add,
             },
         };
-        let composite = cache.queue_render_pipeline(RenderPipelineDescriptor {
-            label: Some("cloud_composite".into()),
-            layout: vec![self.empty.clone(), self.empty.clone(), self.composite[ms].clone()],
+        let (samples, depth_stencil) = match variant.drawn_into {
+            DrawnInto::Colour => (1, None),
+            // The pass has it attached; the picture knows of it already.
+            DrawnInto::TransparentPass(samples) => (
+                samples,
+                Some(DepthStencilState {
+                    format: CORE_3D_DEPTH_FORMAT,
+                    depth_write_enabled: Some(false),
+                    depth_compare: Some(CompareFunction::Always),
+                    stencil: default(),
+                    bias: default(),
+                }),
+            ),
+        };
+        RenderPipelineDescriptor {
+            label: Some("cloud_draw".into()),
+            layout: vec![self.empty.clone(), self.empty.clone(), self.draw.clone()],
             vertex: self.fullscreen.to_vertex_state(),
+            depth_stencil,
+            multisample: MultisampleState { count: samples, ..default() },
             fragment: Some(FragmentState {
-                shader: self.shaders[3].clone(),
-                shader_defs: defs.clone(),
+                shader: self.shaders[6].clone(),
                 entry_point: Some("main".into()),
                 targets: vec![Some(ColorTargetState {
                     format: variant.target,
@@ -276,20 +326,7 @@ impl CloudPipelines {
                 ..default()
             }),
             ..default()
-        });
-        let march = compute("cloud_march", 1, [air, &model.layout, &self.march[ms]]);
-        let made = Pipelines {
-            sky: compute("cloud_sky", 0, [air, &model.layout, &self.sky]),
-            march,
-            plain_march: march,
-            accumulate: compute("cloud_accumulate", 2, [&self.empty, &self.empty, &self.accumulate]),
-            blend: compute("cloud_blend", 5, [&self.empty, &self.empty, &self.blend[ms]]),
-            composite,
-            publish: compute("cloud_publish", 4, [&self.empty, &self.empty, &self.publish[ms]]),
-            traced: None,
-        };
-        self.made.insert(variant, made);
-        made
+        }
     }
 }
 
@@ -301,11 +338,11 @@ impl Pipelines {
 
     /// Whether a picture can be drawn: every stage is compiled, be the march that of finished clouds.
     pub fn drawable(self, cache: &PipelineCache) -> bool {
-        [self.sky, self.drawable_march(cache), self.accumulate, self.blend, self.publish]
+        [self.sky, self.drawable_march(cache), self.accumulate, self.blend, self.composite, self.publish, self.depth]
             .iter()
             .chain(self.traced.iter().flatten())
             .all(|id| cache.get_compute_pipeline(*id).is_some())
-            && cache.get_render_pipeline(self.composite).is_some()
+            && cache.get_render_pipeline(self.draw).is_some()
     }
 
     /// Whether it is the picture that was asked for.

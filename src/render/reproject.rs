@@ -137,6 +137,7 @@ impl HeldUniform {
             *matrix = now.clip_of(before);
             let weight = if now.fits(before) { 1.0 } else { 0.0 };
             (terms.x, terms.y) = (weight, now.shift(before).length());
+            terms.w = now.exposure / before.exposure;
         }
         uniform
     }

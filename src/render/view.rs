@@ -1,6 +1,7 @@
 //! From the main world to what one view's passes need.
 
 use bevy::{
+    camera::MainPassResolutionOverride,
     math::DVec3,
     pbr::{ExtractedAtmosphere, ExtractedDirectionalLight},
     prelude::*,
@@ -15,17 +16,23 @@ use bevy::{
 };
 
 use super::{
-    CloudBuffer, CloudFrame, CloudNoise, StatusFlags,
+    CloudBuffer, CloudDepth, CloudFrame, CloudNoise, StatusFlags,
     bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey},
+    phase_slots::PhaseSlots,
+    pipelines::DrawnInto,
     reproject::{HeldUniform, Pose},
+    versions::{Baked, Versions},
+    zones::{ExtractedZones, zones_around},
 };
 use crate::{
-    model::{ModelUniform, TangentFrame, TexelSizes},
+    model::{MAX_ZONES, ModelSettings, ModelUniform, TangentFrame, TexelSizes},
+    phases::ReadyTables,
     reference::planet::PLANET_RADIUS,
     settings::{
-        CloudDebugView, CloudLighting, CloudModel, CloudQuality, CloudSettings, CloudView, GoodSettings, Validate,
+        CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase, CloudQuality, CloudSettings,
+        CloudView, CloudWeather, GoodPhases, GoodSettings, Validate,
     },
     textures::CloudTextureViews,
 };
@@ -33,9 +40,16 @@ use crate::{
 /// The settings of this frame.
 #[derive(Resource, Default)]
 pub(crate) struct ExtractedClouds {
-    settings: CloudSettings,
+    pub settings: CloudSettings,
+    /// Phase functions beside the lighting's own.
+    phases: Vec<CloudPhase>,
+    pub(super) tables: ReadyTables,
     /// Counts changes that make held frames wrong.
-    version: u64,
+    pub(super) version: u64,
+    /// Counts those by transitions, which the temporal filter follows and the path tracer does not.
+    pub(super) transitions: u64,
+    /// How fast a transition moves outlines (m/s).
+    outline_speed: f32,
 }
 
 /// A camera that shows clouds.
@@ -44,7 +58,9 @@ pub(crate) struct ExtractedCloudView {
     quality: CloudQuality,
     reset: u32,
     pub debug: CloudDebugView,
+    pub order: CloudOrder,
     pub buffer: Option<AssetId<Image>>,
+    pub depth: Option<AssetId<Image>>,
     pub frame: Option<AssetId<Image>>,
     pub noise: Option<AssetId<Image>>,
 }
@@ -52,6 +68,14 @@ pub(crate) struct ExtractedCloudView {
 impl ExtractedCloudView {
     pub fn is_path_traced(&self) -> bool {
         self.quality.is_path_traced()
+    }
+
+    /// What its clouds are drawn into.
+    pub fn drawn_into(&self, msaa: Msaa) -> DrawnInto {
+        match self.order {
+            CloudOrder::Sorted | CloudOrder::BeforeTransparent => DrawnInto::TransparentPass(msaa.samples()),
+            CloudOrder::AfterTransparent => DrawnInto::Colour,
+        }
     }
 }
 
@@ -69,6 +93,7 @@ type CameraItems = (
     &'static Camera,
     Option<&'static CloudView>,
     Option<&'static CloudBuffer>,
+    Option<&'static CloudDepth>,
     Option<&'static CloudFrame>,
     Option<&'static CloudNoise>,
 );
@@ -83,12 +108,34 @@ pub(crate) fn forget_lost_device(mut commands: Commands, views: Query<Entity, Wi
     }
 }
 
-pub(crate) fn extract_settings(good: Extract<Res<GoodSettings>>, mut out: ResMut<ExtractedClouds>) {
+pub(crate) fn extract_settings(
+    good: Extract<Res<GoodSettings>>,
+    phases: Extract<Res<GoodPhases>>,
+    tables: Extract<Res<ReadyTables>>,
+    weather: Extract<Option<Res<CloudWeather>>>,
+    mut out: ResMut<ExtractedClouds>,
+) {
+    let weather = weather.as_ref().filter(|weather| weather.has_moved());
+    out.outline_speed = weather.map_or(0.0, |weather| weather.outline_speed(good.0.clock.seconds) as f32);
+    if weather.is_some() {
+        // As when the sun moves, frames held are still of use.
+        out.settings.model.clone_from(&good.0.model);
+        out.settings.layers.clone_from(&good.0.layers);
+        out.settings.lighting.clone_from(&good.0.lighting);
+        out.phases.clone_from(&phases.0);
+        out.tables.clone_from(&tables);
+        out.transitions += 1;
+    }
     // Time and a shifted origin move what is seen; frames held are moved along.
     out.settings.clock.clone_from(&good.0.clock);
     out.settings.model.world_offset = good.0.model.world_offset;
-    if out.settings != good.0 {
+    if out.settings != good.0 || out.phases != phases.0 {
         out.settings.clone_from(&good.0);
+        out.phases.clone_from(&phases.0);
+        out.version += 1;
+    }
+    if out.tables.generation != tables.generation {
+        out.tables.clone_from(&tables);
         out.version += 1;
     }
 }
@@ -100,7 +147,7 @@ pub(crate) fn extract_views(
     had: Query<(), With<ExtractedCloudView>>,
     mut warned: Local<Option<String>>,
 ) {
-    for (entity, camera, view, buffer, frame, noise) in &cameras {
+    for (entity, camera, view, buffer, depth, frame, noise) in &cameras {
         let Some(view) = view.filter(|v| v.enabled && camera.is_active) else {
             if had.contains(entity) {
                 commands.entity(entity).remove::<Ours>();
@@ -124,7 +171,9 @@ pub(crate) fn extract_views(
             quality,
             reset: view.reset,
             debug: view.debug,
+            order: view.order,
             buffer: buffer.map(|b| b.0.id()),
+            depth: depth.map(|d| d.0.id()),
             frame: frame.map(|f| f.0.id()),
             noise: noise.map(|n| n.0.id()),
         });
@@ -173,9 +222,18 @@ pub(crate) struct PreparedView {
     view: &'static ExtractedView,
     camera: &'static ExtractedCamera,
     msaa: &'static Msaa,
+    small: Option<&'static MainPassResolutionOverride>,
     atmosphere: Option<&'static ExtractedAtmosphere>,
     history: Option<&'static mut CloudHistory>,
     uniforms: Option<&'static mut CloudUniforms>,
+}
+
+impl PreparedViewItem<'_, '_> {
+    /// What the scene is drawn into: less than the view where it is enlarged later.
+    fn drawn_viewport(&self) -> UVec4 {
+        let whole = self.view.viewport;
+        self.small.map_or(whole, |size| UVec4::new(whole.x, whole.y, size.x.min(whole.z), size.y.min(whole.w)))
+    }
 }
 
 pub(crate) fn prepare_views(
@@ -184,15 +242,19 @@ pub(crate) fn prepare_views(
     lights: Query<&ExtractedDirectionalLight>,
     clouds: Res<ExtractedClouds>,
     textures: Res<CloudTextureViews>,
+    zones: Res<ExtractedZones>,
+    mut baked: Local<Baked>,
     status: Res<StatusFlags>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     mut warned: Local<bevy::platform::collections::HashSet<Entity>>,
+    mut crowded: Local<bool>,
 ) {
     let Some(sizes) = TexelSizes::of(&textures) else { return };
     let sun = brightest_sun(&lights);
+    baked.follow(textures.generation, clouds.outline_speed > 0.0);
     for mut item in &mut views {
-        let viewport = item.view.viewport;
+        let viewport = item.drawn_viewport();
         if viewport.z == 0 || viewport.w == 0 {
             commands.entity(item.entity).remove::<(CloudHistory, CloudUniforms, CloudBindGroups)>();
             continue;
@@ -207,7 +269,13 @@ pub(crate) fn prepare_views(
         }
         warned.remove(&item.entity);
         let Some(space) = space else { continue };
-        let (key, pose) = window_state(&item, &clouds, &textures, &space, sun);
+        let (key, pose) = window_state(
+            &item,
+            &clouds,
+            Versions::of(&clouds, &baked, &zones, item.cloud.is_path_traced()),
+            &space,
+            sun,
+        );
         let mut first = None;
         let history = match &mut item.history {
             Some(history) => {
@@ -217,7 +285,8 @@ pub(crate) fn prepare_views(
             None => first.insert(CloudHistory::new(&device, key, pose)),
         };
         let (window, held) = (history.frame, history.held_uniform());
-        let (model, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
+        let (model, layers, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
+        let phases = PhaseSlots::new(&lighting, &clouds.phases, &clouds.tables);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
             world_from_view: pose.rotation,
@@ -227,10 +296,23 @@ pub(crate) fn prepare_views(
             exposure: item.camera.exposure,
             quality: &item.cloud.quality,
             lighting: &lighting,
+            highest_horizon: layers.highest_horizon(space.radius),
+            phases: &phases,
             window,
             debug: item.cloud.debug,
         });
-        let model = ModelUniform::new(&model, clouds.settings.clock.seconds, &space, sizes);
+        let reach = f64::from(item.cloud.quality.max_distance);
+        let (around, too_many) = zones_around(&zones.zones, pose.position, &space, reach);
+        if too_many && !*crowded {
+            *crowded = true;
+            warn!("clouds: camera {} has more than {MAX_ZONES} zones around it; the nearest count", item.entity);
+        }
+        let model = ModelUniform::new(
+            &ModelSettings { model: &model, layers: &layers, zones: &around },
+            clouds.settings.clock.seconds,
+            &space,
+            sizes,
+        );
         let world_from_local = Mat4::from_quat(space.local_from_world.inverse().as_quat());
         let mut own = None;
         let uniforms = match &mut item.uniforms {
@@ -256,24 +338,30 @@ pub(crate) fn prepare_views(
 }
 
 /// The settings with a debug view's changes made to them.
-fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLighting) {
+fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudModel, CloudLayers, CloudLighting) {
     let (mut model, mut lighting) = (settings.model.clone(), settings.lighting.clone());
     debug.change_model(&mut model);
     debug.change_lighting(&mut lighting);
-    (model, lighting)
+    (model, settings.layers.clone(), lighting)
 }
 
-/// The tangent frame under a view: planet centre from the scene's atmosphere, else a radius below the world's origin.
+/// Centre (world space plus offset, m) and radius (m): those of the scene's atmosphere, else a radius below the world's
+/// origin.
+pub(crate) fn planet(atmosphere: Option<&ExtractedAtmosphere>) -> (DVec3, f64) {
+    match atmosphere {
+        Some(a) => (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius)),
+        // Bevy's default planet.
+        None => (DVec3::new(0.0, -PLANET_RADIUS, 0.0), PLANET_RADIUS),
+    }
+}
+
+/// The tangent frame under a view.
 fn space_below(
     view: &ExtractedView,
     atmosphere: Option<&ExtractedAtmosphere>,
     settings: &CloudSettings,
 ) -> Option<TangentFrame> {
-    let (centre, radius) = match atmosphere {
-        Some(a) => (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius)),
-        // Bevy's default planet.
-        None => (DVec3::new(0.0, -PLANET_RADIUS, 0.0), PLANET_RADIUS),
-    };
+    let (centre, radius) = planet(atmosphere);
     let camera = view.world_from_view.translation().as_dvec3() + settings.model.world_offset;
     TangentFrame::below(camera, centre, radius)
 }
@@ -281,23 +369,22 @@ fn space_below(
 fn window_state(
     item: &PreparedViewItem,
     clouds: &ExtractedClouds,
-    textures: &CloudTextureViews,
+    versions: Versions,
     space: &TangentFrame,
     sun: Sun,
 ) -> (HistoryKey, Pose) {
     let quality = &item.cloud.quality;
-    let view = item.view;
+    let (view, viewport) = (item.view, item.drawn_viewport());
     let model = &clouds.settings.model;
-    let angle = texel_angle(view.clip_from_view, view.viewport, quality);
+    let angle = texel_angle(view.clip_from_view, viewport, quality);
     let altitude = space.altitude as f32;
     let to_shell = (model.bottom - altitude).max(altitude - model.top).max(300.0);
     let key = HistoryKey {
-        size: marched_size(view.viewport, quality),
-        viewport: view.viewport,
+        size: marched_size(viewport, quality),
+        viewport,
         window: quality.held_frames(),
         reset: item.cloud.reset,
-        settings: clouds.version,
-        textures: textures.generation,
+        versions,
         quality: quality.clone(),
         debug: item.cloud.debug,
         atmosphere: item.atmosphere.is_some(),
@@ -312,7 +399,7 @@ fn window_state(
         exposure: item.camera.exposure,
         seconds: clouds.settings.clock.seconds,
         wind: model.wind.with_y(0.0),
-        rise: model.wind.y.abs() + model.evolution.abs(),
+        rise: model.wind.y.abs() + model.evolution.abs() + clouds.outline_speed,
         to_shell,
         texel: angle * to_shell,
     };

@@ -34,11 +34,31 @@ pub enum SettingsError {
         /// `model.top` (m).
         top: f32,
     },
+    /// Two fields of which one must be above the other are not.
+    #[error("{high} = {high_value} must be above {low} = {low_value}")]
+    Inverted {
+        /// Path of the one that must be lower.
+        low: String,
+        /// What it was set to.
+        low_value: f32,
+        /// Path of the one that must be higher.
+        high: String,
+        /// What it was set to.
+        high_value: f32,
+    },
+    /// More layers than are shown at once.
+    #[error("layers holds {count} layers, and {most} is the most")]
+    TooManyLayers {
+        /// How many there are.
+        count: usize,
+        /// How many there may be.
+        most: usize,
+    },
     /// A size that must be a power of two is not.
     #[error("{field} = {value} must be a power of two from {min} to {max}")]
     NotPowerOfTwo {
         /// Path of the field.
-        field: &'static str,
+        field: String,
         /// What it was set to.
         value: u32,
         /// Least allowed value.
@@ -115,7 +135,7 @@ impl Validate for CloudTextures {
             [("textures.volume_size", self.volume_size, 32, 256), ("textures.map_size", self.map_size, 64, 4096)]
         {
             if !value.is_power_of_two() {
-                return Err(SettingsError::NotPowerOfTwo { field, value, min, max });
+                return Err(SettingsError::NotPowerOfTwo { field: field.to_owned(), value, min, max });
             }
         }
         Ok(())
@@ -132,8 +152,20 @@ pub(crate) fn fields(value: &dyn PartialReflect) -> Vec<(&'static NamedField, &d
     (0..info.field_len()).filter_map(|i| Some((info.field_at(i)?, s.field_at(i)?))).collect()
 }
 
-/// Checks each field of `value` that carries a range.
+/// The layers in [`CloudLayers`], each a struct.
+pub(crate) fn items(value: &dyn PartialReflect) -> Vec<&dyn PartialReflect> {
+    match value.reflect_ref() {
+        ReflectRef::TupleStruct(s) => s.field(0).map_or_else(Vec::new, items),
+        ReflectRef::List(list) => list.iter().collect(),
+        _ => Vec::new(),
+    }
+}
+
+/// Checks each field of `value`, and of what it holds, that carries a range.
 pub(crate) fn check_ranges(value: &dyn PartialReflect, root: &str) -> Result<(), SettingsError> {
+    for (i, item) in items(value).into_iter().enumerate() {
+        check_ranges(item, &format!("{root}.{i}"))?;
+    }
     for (info, field) in fields(value) {
         let path = format!("{root}.{}", info.name());
         if let Some(range) = info.get_attribute::<RangeInclusive<u32>>() {
@@ -149,6 +181,8 @@ pub(crate) fn check_ranges(value: &dyn PartialReflect, root: &str) -> Result<(),
                     return Err(out_of_range(&format!("{path}{suffix}"), n, range.start(), range.end()));
                 }
             }
+        } else if numbers(field).is_empty() {
+            check_ranges(field, &path)?;
         }
     }
     Ok(())

@@ -3,20 +3,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The angular distribution of scattered light. Each integrates to 1 over the sphere.
-#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
-#[reflect(Default, Serialize, Deserialize, PartialEq)]
-pub enum PhaseFunction {
-    /// 1/4π: no direction is preferred.
-    Isotropic,
-    /// Henyey–Greenstein with asymmetry `g` (thesis, equation 3.11).
-    HenyeyGreenstein,
-    /// `(1 − lobe_mix)·HG(g) + lobe_mix·HG(g_back)`.
-    TwoLobe,
-    /// Jendersie & d'Eon's fit to Mie scattering from `droplet_diameter` (thesis, 3.13 to 3.17); the default.
-    #[default]
-    HgDraine,
-}
+use super::PhaseFunction;
 
 /// Scattering, phase function and ambient light.
 ///
@@ -51,9 +38,10 @@ pub struct CloudLighting {
     /// Asymmetry of that light: how much of it goes on away from the sun (0 all ways alike). Default 0.15, fitted.
     #[reflect(@0.0..=0.9_f32)]
     pub diffusion_asymmetry: f32,
-    /// The phase function. Default [`PhaseFunction::HgDraine`].
+    /// The phase function of layers that have none of their own. Default [`PhaseFunction::HgDraine`].
     pub phase: PhaseFunction,
-    /// Asymmetry of Henyey–Greenstein and of the forward lobe (−1 back, 1 forward). Default 0.8.
+    /// Asymmetry of Henyey–Greenstein, Cornette–Shanks, Schlick and of the forward lobe (−1 back, 1 forward).
+    /// Default 0.8.
     #[reflect(@-0.99..=0.99_f32)]
     pub g: f32,
     /// Asymmetry of the second lobe of [`PhaseFunction::TwoLobe`]. Default −0.3.
@@ -62,9 +50,12 @@ pub struct CloudLighting {
     /// Share of the second lobe (0..1). Default 0.3.
     #[reflect(@0.0..=1.0_f32)]
     pub lobe_mix: f32,
-    /// Droplet diameter of [`PhaseFunction::HgDraine`] (µm). Default 12.
+    /// Droplet diameter of [`PhaseFunction::HgDraine`] and [`PhaseFunction::Mie`] (µm). Default 12.
     #[reflect(@5.0..=50.0_f32)]
     pub droplet_diameter: f32,
+    /// Strength of the 22° halo of [`PhaseFunction::Ice`] (0 rough crystals, 1 smooth prisms). Default 0.
+    #[reflect(@0.0..=1.0_f32)]
+    pub halo: f32,
     /// Upper bound of a phase value (1/sr). The diffraction peak of real droplets reaches 10²…10⁴ within a
     /// degree of the sun and would alias. What is cut there is lost: at 12 µm 2 % of single scattering with the
     /// default, 28 % (all within 1.6° of the sun) with 30. Default 500.
@@ -112,6 +103,7 @@ impl Default for CloudLighting {
             g_back: -0.3,
             lobe_mix: 0.3,
             droplet_diameter: 12.0,
+            halo: 0.0,
             phase_limit: 500.0,
             sun_strength: 1.0,
             ambient_strength: 1.0,

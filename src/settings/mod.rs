@@ -2,26 +2,37 @@
 
 mod check;
 mod debug;
+mod layers;
 mod lighting;
 mod model;
 mod paths;
+mod phase;
 mod preset;
 mod quality;
 mod textures;
+mod transition;
 mod view;
+mod zone;
 
 use bevy::prelude::*;
+
+use crate::weather::{LclFormula, Steering, StormCell, WeatherRecipe};
 
 pub use check::{SettingsError, Validate};
 pub use debug::CloudDebugView;
 pub(crate) use debug::DebugShader;
-pub use lighting::{CloudLighting, PhaseFunction};
+pub use layers::{CloudLayer, CloudLayers, LayerKind, MAX_LAYERS, MapChannels};
+pub use lighting::CloudLighting;
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
+pub(crate) use phase::GoodPhases;
+pub use phase::{CloudPhase, ModelPhases, PhaseFunction};
 pub use preset::{CloudPreset, PresetError};
 pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
-pub use view::{CloudClock, CloudView};
+pub use transition::CloudWeather;
+pub use view::{CloudClock, CloudOrder, CloudView};
+pub use zone::CloudZone;
 
 /// The last good value of each setting: what the renderer sees. A bad change is reported once and ignored.
 #[derive(Resource, Clone, Debug, Default)]
@@ -37,21 +48,35 @@ pub(crate) struct CloudSettingsPlugin;
 impl Plugin for CloudSettingsPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<CloudModel>()
+            .init_resource::<CloudLayers>()
             .init_resource::<CloudLighting>()
             .init_resource::<CloudQuality>()
             .init_resource::<CloudTextures>()
             .init_resource::<CloudTextureSlots>()
             .init_resource::<CloudClock>()
+            .init_resource::<CloudWeather>()
             .init_resource::<GoodSettings>()
+            .init_resource::<ModelPhases>()
+            .init_resource::<GoodPhases>()
             .register_type::<CloudModel>()
+            .register_type::<CloudLayers>()
             .register_type::<CloudLighting>()
             .register_type::<CloudQuality>()
             .register_type::<CloudTextures>()
             .register_type::<CloudTextureSlots>()
             .register_type::<CloudClock>()
             .register_type::<CloudView>()
+            .register_type::<CloudOrder>()
             .register_type::<CloudDebugView>()
             .register_type::<CloudPreset>()
+            .register_type::<CloudPhase>()
+            .register_type::<ModelPhases>()
+            .register_type::<CloudWeather>()
+            .register_type::<CloudZone>()
+            .register_type::<WeatherRecipe>()
+            .register_type::<StormCell>()
+            .register_type::<Steering>()
+            .register_type::<LclFormula>()
             .init_asset::<CloudPreset>()
             .init_asset_loader::<preset::CloudPresetLoader>()
             .add_systems(
@@ -61,14 +86,17 @@ impl Plugin for CloudSettingsPlugin {
                     // As Bevy's own clock is: it rotates messages, and this system has none.
                     .ambiguous_with(bevy::ecs::message::message_update_system),
             )
+            .add_systems(Last, transition::change_weather.before(KeepGood))
             .add_systems(
                 Last,
                 (
                     keep_good::<CloudModel>,
+                    keep_good::<CloudLayers>,
                     keep_good::<CloudLighting>,
                     keep_good::<CloudQuality>,
                     keep_good::<CloudTextures>,
                     keep_good::<CloudClock>,
+                    phase::keep_good_phases,
                 )
                     .chain()
                     .in_set(KeepGood),
@@ -88,7 +116,7 @@ macro_rules! kept {
         })*
     };
 }
-kept!(CloudModel => model, CloudLighting => lighting, CloudQuality => quality,
+kept!(CloudModel => model, CloudLayers => layers, CloudLighting => lighting, CloudQuality => quality,
       CloudTextures => textures, CloudClock => clock);
 
 fn keep_good<S: Kept>(setting: Option<Res<S>>, mut good: ResMut<GoodSettings>, mut reported: Local<Option<String>>) {

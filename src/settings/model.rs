@@ -22,6 +22,8 @@ pub enum Erosion {
 #[reflect(Resource, Default, Serialize, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudModel {
+    /// Whether this layer is shown; [`CloudLayers`](super::CloudLayers) have their own. Default true.
+    pub enabled: bool,
     /// Altitude of the lower shell, where bases sit (m above the planet's surface). Default 1300.
     #[reflect(@-400.0..=30_000.0_f32)]
     pub bottom: f32,
@@ -85,6 +87,9 @@ pub struct CloudModel {
     /// Rise of the noise through the clouds (m/s): shapes evolve instead of only sliding. Default 0.8.
     #[reflect(@-50.0..=50.0_f32)]
     pub evolution: f32,
+    /// Where the layer is at time zero (m, f64). Transitions keep a sky in place with it. Default 0.
+    #[reflect(@-1.0e12..=1.0e12_f32)]
+    pub drift: DVec3,
     /// Position of the world's origin on the planet's map (m, f64): change it when a floating origin shifts.
     /// Default 0.
     #[reflect(@-1.0e12..=1.0e12_f32)]
@@ -94,6 +99,7 @@ pub struct CloudModel {
 impl Default for CloudModel {
     fn default() -> Self {
         Self {
+            enabled: true,
             bottom: 1300.0,
             top: 3300.0,
             coverage: 0.04,
@@ -115,6 +121,7 @@ impl Default for CloudModel {
             wind: Vec3::new(8.0, 0.0, 3.0),
             wind_skew: 350.0,
             evolution: 0.8,
+            drift: DVec3::ZERO,
             world_offset: DVec3::ZERO,
         }
     }

@@ -4,13 +4,15 @@ use bevy::{
     math::DVec3,
     prelude::*,
     reflect::{
-        PartialReflect, ReflectMut, TypeInfo,
+        PartialReflect, ReflectMut, ReflectRef, TypeInfo,
         enums::{DynamicEnum, DynamicVariant},
     },
 };
 
 use super::{
-    CloudClock, CloudLighting, CloudModel, CloudQuality, CloudTextures, SettingsError, Validate, check::fields,
+    CloudClock, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudQuality, CloudTextures, MAX_LAYERS,
+    SettingsError, Validate,
+    check::{fields, items},
 };
 
 /// All settings that are plain data, together: what a path can reach.
@@ -18,6 +20,8 @@ use super::{
 pub struct CloudSettings {
     /// Paths `model.*`.
     pub model: CloudModel,
+    /// Paths `layers.0.*`, `layers.1.*` and so on.
+    pub layers: CloudLayers,
     /// Paths `lighting.*`.
     pub lighting: CloudLighting,
     /// Paths `quality.*`.
@@ -29,9 +33,10 @@ pub struct CloudSettings {
 }
 
 impl CloudSettings {
-    fn roots(&self) -> [(&'static str, &dyn PartialReflect); 5] {
+    fn roots(&self) -> [(&'static str, &dyn PartialReflect); 6] {
         [
             (CloudModel::ROOT, &self.model),
+            (CloudLayers::ROOT, &self.layers),
             (CloudLighting::ROOT, &self.lighting),
             (CloudQuality::ROOT, &self.quality),
             (CloudTextures::ROOT, &self.textures),
@@ -42,6 +47,7 @@ impl CloudSettings {
     fn root_mut(&mut self, root: &str) -> Option<&mut dyn PartialReflect> {
         Some(match root {
             CloudModel::ROOT => &mut self.model,
+            CloudLayers::ROOT => &mut self.layers,
             CloudLighting::ROOT => &mut self.lighting,
             CloudQuality::ROOT => &mut self.quality,
             CloudTextures::ROOT => &mut self.textures,
@@ -50,11 +56,16 @@ impl CloudSettings {
         })
     }
 
-    /// Every path that [`set`](Self::set) takes, in the order of the structs.
+    /// Every path that [`set`](Self::set) takes, in the order of the structs. Layers are numbered from 0; the one after the
+    /// last is listed too, since setting any of its fields adds it.
     pub fn paths(&self) -> Vec<String> {
+        let mut more = self.clone();
+        if more.layers.0.len() < MAX_LAYERS {
+            more.layers.0.push(CloudLayer::default());
+        }
         let mut all = Vec::new();
-        for (root, value) in self.roots() {
-            all.extend(fields(value).iter().map(|(info, _)| format!("{root}.{}", info.name())));
+        for (root, value) in more.roots() {
+            list_paths(value, root, &mut all);
         }
         all
     }
@@ -67,18 +78,21 @@ impl CloudSettings {
     /// [`validate`](Self::validate) when all are set.
     pub fn set(&mut self, path: &str, text: &str) -> Result<(), SettingsError> {
         let unknown = || SettingsError::UnknownPath(path.to_owned());
-        let (root, name) = path.split_once('.').ok_or_else(unknown)?;
+        let (root, rest) = path.split_once('.').ok_or_else(unknown)?;
         let mut changed = self.clone();
-        let target = changed.root_mut(root).ok_or_else(unknown)?;
-        {
-            let ReflectMut::Struct(s) = target.reflect_mut() else { return Err(unknown()) };
-            let field = s.field_mut(name).ok_or_else(unknown)?;
-            parse_into(field, text.trim()).map_err(|expected| SettingsError::WrongType {
-                field: path.to_owned(),
-                value: text.to_owned(),
-                expected,
-            })?;
+        if root == CloudLayers::ROOT && rest.split('.').next() == Some(&*changed.layers.0.len().to_string()) {
+            changed.layers.0.push(CloudLayer::default());
+            if changed.layers.0.len() > MAX_LAYERS {
+                return Err(SettingsError::TooManyLayers { count: changed.layers.0.len(), most: MAX_LAYERS });
+            }
         }
+        let target = changed.root_mut(root).ok_or_else(unknown)?;
+        let field = field_at(target, rest).ok_or_else(unknown)?;
+        parse_into(field, text.trim()).map_err(|expected| SettingsError::WrongType {
+            field: path.to_owned(),
+            value: text.to_owned(),
+            expected,
+        })?;
         super::check::check_ranges(target, root)?;
         *self = changed;
         Ok(())
@@ -90,10 +104,49 @@ impl CloudSettings {
     /// The first field found wrong.
     pub fn validate(&self) -> Result<(), SettingsError> {
         self.model.validate()?;
+        self.layers.validate()?;
         self.lighting.validate()?;
         self.quality.validate()?;
         self.textures.validate()?;
         self.clock.validate()
+    }
+}
+
+/// Whether a field is a struct of settings, and not a value such as a vector.
+fn is_group(field: &dyn PartialReflect) -> bool {
+    matches!(field.reflect_ref(), ReflectRef::Struct(_))
+        && !(field.try_downcast_ref::<Vec3>().is_some() || field.try_downcast_ref::<DVec3>().is_some())
+}
+
+fn list_paths(value: &dyn PartialReflect, root: &str, all: &mut Vec<String>) {
+    for (i, item) in items(value).into_iter().enumerate() {
+        list_paths(item, &format!("{root}.{i}"), all);
+    }
+    for (info, field) in fields(value) {
+        let path = format!("{root}.{}", info.name());
+        if is_group(field) {
+            list_paths(field, &path, all);
+        } else if field.try_downcast_ref::<Option<Handle<Image>>>().is_none() {
+            all.push(path);
+        }
+    }
+}
+
+/// The field that the dotted path leads to from `value`.
+fn field_at<'a>(value: &'a mut dyn PartialReflect, path: &str) -> Option<&'a mut dyn PartialReflect> {
+    let (name, rest) = path.split_once('.').map_or((path, None), |(name, rest)| (name, Some(rest)));
+    let field = match value.reflect_mut() {
+        ReflectMut::Struct(s) => s.field_mut(name)?,
+        ReflectMut::TupleStruct(s) => {
+            let ReflectMut::List(list) = s.field_mut(0)?.reflect_mut() else { return None };
+            list.get_mut(name.parse().ok()?)?
+        }
+        _ => return None,
+    };
+    match rest {
+        Some(rest) if is_group(field) => field_at(field, rest),
+        Some(_) => None,
+        None => Some(field),
     }
 }
 
@@ -118,6 +171,8 @@ fn parse_into(field: &mut dyn PartialReflect, text: &str) -> Result<(), String> 
         *v = one(text, "a whole number, not negative")?;
     } else if let Some(v) = field.try_downcast_mut::<bool>() {
         *v = one(text, "true or false")?;
+    } else if let Some(v) = field.try_downcast_mut::<String>() {
+        text.clone_into(v);
     } else if let Some(v) = field.try_downcast_mut::<Vec3>() {
         *v = three::<f32>(text)?.into();
     } else if let Some(v) = field.try_downcast_mut::<DVec3>() {

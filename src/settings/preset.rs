@@ -7,7 +7,7 @@ use bevy::{
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use super::{CloudLighting, CloudModel, CloudTextures, SettingsError, Validate};
+use super::{CloudLayers, CloudLighting, CloudModel, CloudTextures, SettingsError, Validate};
 
 /// A sky: what to put into [`CloudModel`], [`CloudLighting`] and [`CloudTextures`]. Quality is not part of it.
 ///
@@ -16,8 +16,10 @@ use super::{CloudLighting, CloudModel, CloudTextures, SettingsError, Validate};
 #[reflect(Default, Serialize, Deserialize, PartialEq)]
 #[serde(default, deny_unknown_fields)]
 pub struct CloudPreset {
-    /// Where cloud is.
+    /// The thesis's layer.
     pub model: CloudModel,
+    /// Weather-map layers.
+    pub layers: CloudLayers,
     /// How light crosses it.
     pub lighting: CloudLighting,
     /// What the textures are baked from.
@@ -56,11 +58,29 @@ pub enum PresetError {
 }
 
 /// Names and texts of the presets that come with the crate.
-const BUILT_IN: [(&str, &str); 4] = [
+const BUILT_IN: [(&str, &str); 22] = [
     ("ClearDay", include_str!("../../assets/presets/clear_day.clouds.ron")),
     ("FairWeather", include_str!("../../assets/presets/fair_weather.clouds.ron")),
     ("Overcast", include_str!("../../assets/presets/overcast.clouds.ron")),
     ("Sunset", include_str!("../../assets/presets/sunset.clouds.ron")),
+    ("Cirrus", include_str!("../../assets/presets/cirrus.clouds.ron")),
+    ("Cirrocumulus", include_str!("../../assets/presets/cirrocumulus.clouds.ron")),
+    ("Cirrostratus", include_str!("../../assets/presets/cirrostratus.clouds.ron")),
+    ("Altocumulus", include_str!("../../assets/presets/altocumulus.clouds.ron")),
+    ("Altostratus", include_str!("../../assets/presets/altostratus.clouds.ron")),
+    ("Nimbostratus", include_str!("../../assets/presets/nimbostratus.clouds.ron")),
+    ("Stratocumulus", include_str!("../../assets/presets/stratocumulus.clouds.ron")),
+    ("Stratus", include_str!("../../assets/presets/stratus.clouds.ron")),
+    ("Cumulus", include_str!("../../assets/presets/cumulus.clouds.ron")),
+    ("Cumulonimbus", include_str!("../../assets/presets/cumulonimbus.clouds.ron")),
+    ("FairWeatherCumulus", include_str!("../../assets/presets/fair_weather_cumulus.clouds.ron")),
+    ("ToweringCumulus", include_str!("../../assets/presets/towering_cumulus.clouds.ron")),
+    ("Broken", include_str!("../../assets/presets/broken.clouds.ron")),
+    ("Storm", include_str!("../../assets/presets/storm.clouds.ron")),
+    ("WinterStratus", include_str!("../../assets/presets/winter_stratus.clouds.ron")),
+    ("MackerelSky", include_str!("../../assets/presets/mackerel_sky.clouds.ron")),
+    ("RedSunset", include_str!("../../assets/presets/red_sunset.clouds.ron")),
+    ("AfterRain", include_str!("../../assets/presets/after_rain.clouds.ron")),
 ];
 
 impl CloudPreset {
@@ -88,6 +108,7 @@ impl CloudPreset {
             .map_err(|source| PresetError::Parse { file: file.to_owned(), source: Box::new(source) })?;
         let named = |source| PresetError::Settings { file: file.to_owned(), source };
         preset.model.validate().map_err(named)?;
+        preset.layers.validate().map_err(named)?;
         preset.lighting.validate().map_err(named)?;
         preset.textures.validate().map_err(named)?;
         Ok(preset)
@@ -111,6 +132,7 @@ impl CloudPreset {
     /// Puts the preset into the world's settings.
     pub fn apply(&self, world: &mut World) {
         world.insert_resource(self.model.clone());
+        world.insert_resource(self.layers.clone());
         world.insert_resource(self.lighting.clone());
         world.insert_resource(self.textures.clone());
     }

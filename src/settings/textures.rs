@@ -31,6 +31,14 @@ pub struct CloudTextures {
     /// Cells along one side of the type map's first octave. Default 6.
     #[reflect(@1..=64_u32)]
     pub type_cells: u32,
+    /// Cells along one side of the first octave of the shape volume that weather-map layers read. Default 4. The volume is
+    /// baked once there is such a layer.
+    #[reflect(@1..=32_u32)]
+    pub shape_cells: u32,
+    /// Cells along one side of the first octave of those layers' detail volume, whose side is a quarter of `volume_size`
+    /// (32 at least). Default 4.
+    #[reflect(@1..=32_u32)]
+    pub detail_cells: u32,
 }
 
 impl Default for CloudTextures {
@@ -43,6 +51,8 @@ impl Default for CloudTextures {
             wisp_cells: 4,
             coverage_cells: 7,
             type_cells: 6,
+            shape_cells: 4,
+            detail_cells: 4,
         }
     }
 }
@@ -66,4 +76,8 @@ pub struct CloudTextureSlots {
     pub gradient: Option<Handle<Image>>,
     /// Blue noise: a tiling 2D image, RGB, three independent channels.
     pub blue_noise: Option<Handle<Image>>,
+    /// Shape of weather-map layers: a tiling 3D image; R Perlin-Worley, GBA Worley octaves of rising frequency.
+    pub shape: Option<Handle<Image>>,
+    /// Detail of weather-map layers: a tiling 3D image; RGB Worley octaves of rising frequency.
+    pub detail: Option<Handle<Image>>,
 }

@@ -5,6 +5,23 @@ use serde::{Deserialize, Serialize};
 
 use super::{CloudDebugView, CloudQuality, Validate};
 
+/// Where clouds stand among transparent things: glass, particles, water. Opaque things need no such choice: at each of
+/// their pixels the clouds end where they begin.
+#[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]
+#[reflect(Default, Serialize, Deserialize, PartialEq)]
+pub enum CloudOrder {
+    /// As one sorted surface, the default. What lies beyond the layer of clouds, seen from the camera, is drawn first
+    /// and seen through them; what lies before it or in it is drawn over them, and may fade itself with
+    /// [`CloudDepth`](crate::CloudDepth). A thing's place is its centre, as for sorting among themselves.
+    #[default]
+    Sorted,
+    /// Before all of them: nothing transparent is ever covered by a cloud.
+    BeforeTransparent,
+    /// Over all of them, as Bevy draws its fog, and after its TAA, which reprojects clouds like the sky they cover and
+    /// so softens them a little while the camera turns.
+    AfterTransparent,
+}
+
 /// Draws clouds in this camera's view. Opt-in, like `Bloom`; the camera needs a perspective projection.
 ///
 /// Each camera has its own buffers and history. Removing it, or `enabled: false`, costs the GPU nothing.
@@ -21,11 +38,13 @@ pub struct CloudView {
     pub reset: u32,
     /// A stage to look at alone. Default [`CloudDebugView::None`], which costs nothing.
     pub debug: CloudDebugView,
+    /// Where clouds stand among transparent things. Default [`CloudOrder::Sorted`]; all cost the same.
+    pub order: CloudOrder,
 }
 
 impl Default for CloudView {
     fn default() -> Self {
-        Self { enabled: true, quality: None, reset: 0, debug: CloudDebugView::None }
+        Self { enabled: true, quality: None, reset: 0, debug: CloudDebugView::None, order: CloudOrder::Sorted }
     }
 }
 

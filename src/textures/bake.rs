@@ -21,7 +21,7 @@ use super::{
     recipe::Recipe,
     slots::{CloudTextureSlot, SlotStates, check_descriptor},
 };
-use crate::settings::{CloudTextures, GoodSettings};
+use crate::settings::{CloudTextures, GoodSettings, MAX_LAYERS};
 
 /// Most work that baking does in one frame on a software rasteriser, in texel-octaves: one texel of one octave of 3D
 /// Worley noise, or what takes as long. Measured at 10 to 30 ms with Mesa's lavapipe on two cores.
@@ -37,12 +37,17 @@ pub const GPU_FRAMES: u32 = 8;
 #[derive(Resource, Clone, PartialEq, Default)]
 pub(super) struct Wanted {
     settings: Option<CloudTextures>,
+    /// Whether there are weather-map layers.
+    layers: bool,
     /// The image of each slot that has a good one, with the count of its changes.
     images: [Option<(AssetId<Image>, u32)>; CloudTextureSlot::COUNT],
 }
 
 impl Wanted {
     fn content(&self, slot: CloudTextureSlot) -> Option<Content> {
+        if slot.is_of_layers() && !self.layers {
+            return None;
+        }
         let image = self.images[slot as usize];
         match (image, slot) {
             (Some((image, revision)), CloudTextureSlot::Coverage | CloudTextureSlot::TypeMap) => {
@@ -66,7 +71,11 @@ pub(super) fn extract(
         progress.0.enabled.store(true, Relaxed);
         progress.0.ask();
     }
-    let now = Wanted { settings: Some(good.0.textures.clone()), images: slots.images() };
+    let now = Wanted {
+        settings: Some(good.0.textures.clone()),
+        layers: good.0.layers.shown().next().is_some(),
+        images: slots.images(),
+    };
     if *wanted != now {
         *wanted = now;
         progress.0.ask();
@@ -102,6 +111,19 @@ pub(crate) struct CloudTextureViews {
     pub gradient: Option<TextureView>,
     /// rgb three independent channels; a texel t in \[0, 1\] stands for `t * 255/256 + 0.5/256`.
     pub blue_noise: Option<TextureView>,
+    /// Noise volumes of weather-map layers; not there before there is one.
+    pub shape: Option<TextureView>,
+    pub detail: Option<TextureView>,
+    /// Weather maps of the layers, an array; which layers have theirs, and its side in texels.
+    pub weather: Option<TextureView>,
+    pub weather_layers: [bool; MAX_LAYERS],
+    pub weather_size: u32,
+    /// Whether more of them are to come.
+    pub maps_pending: bool,
+    /// Whether anything is still to be baked or loaded.
+    pub bake_pending: bool,
+    /// Rg a curl field, b fibres, a cells.
+    pub swirl: Option<TextureView>,
     pub generation: u64,
 }
 
@@ -121,6 +143,8 @@ impl CloudTextureViews {
             CloudTextureSlot::TypeMap => &mut self.type_map,
             CloudTextureSlot::Gradient => &mut self.gradient,
             CloudTextureSlot::BlueNoise => &mut self.blue_noise,
+            CloudTextureSlot::Shape => &mut self.shape,
+            CloudTextureSlot::Detail => &mut self.detail,
         };
         *place = Some(view);
     }
@@ -252,6 +276,7 @@ pub(super) fn plan(
             }
         }
     }
+    views.bake_pending = !satisfied;
     report(&mut bakery, satisfied, &wanted, &images, &progress);
 }
 

@@ -138,7 +138,7 @@ impl Job {
             })
         };
         match pass.kernel {
-            Kernel::Billow | Kernel::Wisp | Kernel::Gradient => make(None, &level(0)),
+            Kernel::Billow | Kernel::Wisp | Kernel::Shape | Kernel::Gradient => make(None, &level(0)),
             Kernel::Coverage | Kernel::TypeMap => make(None, self.source.as_ref()?),
             Kernel::FirstLevel => make(Some(self.source.as_ref()?), &level(0)),
             Kernel::VolumeMip | Kernel::NextLevel => make(Some(&level(pass.level - 1)), &level(pass.level)),

@@ -27,6 +27,7 @@ pub(crate) mod readback;
 mod recipe;
 mod slots;
 mod texel;
+pub(crate) mod weather_maps;
 
 use std::sync::atomic::Ordering::Relaxed;
 
@@ -70,6 +71,11 @@ impl Plugin for CloudTexturesPlugin {
             .add_message::<CloudTextureError>()
             .add_systems(PreStartup, slots::load_blue_noise.run_if(resource_exists::<Assets<Image>>))
             .add_systems(First, progress::report.ambiguous_with(bevy::ecs::message::message_update_system))
+            .init_resource::<weather_maps::LayerMaps>()
+            .add_systems(
+                Last,
+                weather_maps::follow_layers.after(crate::settings::KeepGood).run_if(resource_exists::<Assets<Image>>),
+            )
             .add_systems(Last, slots::check_slots.run_if(resource_exists::<Assets<Image>>));
     }
 }
@@ -77,14 +83,21 @@ impl Plugin for CloudTexturesPlugin {
 /// The render half, for devices that have compute shaders and can store to `rgba8unorm` and `rgba16float`. Call it once,
 /// from `Plugin::finish`; without it nothing is baked and [`CloudTextureStatus::baking`] stays false.
 pub(crate) fn build_render(render_app: &mut SubApp) {
-    render_app.init_resource::<progress::Progress>().init_resource::<bake::Wanted>();
+    render_app
+        .init_resource::<progress::Progress>()
+        .init_resource::<bake::Wanted>()
+        .init_resource::<weather_maps::WeatherMaps>();
     let progress = render_app.world().resource::<progress::Progress>();
     progress.0.enabled.store(true, Relaxed);
     progress.0.ask();
     render_app
         .init_gpu_resource::<pipelines::BakePipelines>()
         .init_gpu_resource::<bake::Bakery>()
-        .add_systems(ExtractSchedule, bake::extract)
-        .add_systems(Render, bake::plan.in_set(RenderSystems::PrepareResources).in_set(TextureSwaps))
+        .init_gpu_resource::<weather_maps::Uploaded>()
+        .add_systems(ExtractSchedule, (bake::extract, weather_maps::extract))
+        .add_systems(
+            Render,
+            (bake::plan, weather_maps::upload).chain().in_set(RenderSystems::PrepareResources).in_set(TextureSwaps),
+        )
         .add_systems(RenderGraph, bake::bake.before(camera_driver));
 }

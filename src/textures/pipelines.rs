@@ -31,6 +31,7 @@ pub(super) struct BakeParams {
 pub(super) enum Kernel {
     Billow,
     Wisp,
+    Shape,
     VolumeMip,
     Coverage,
     TypeMap,
@@ -40,9 +41,10 @@ pub(super) enum Kernel {
 }
 
 impl Kernel {
-    const ALL: [Self; 8] = [
+    const ALL: [Self; 9] = [
         Self::Billow,
         Self::Wisp,
+        Self::Shape,
         Self::VolumeMip,
         Self::Coverage,
         Self::TypeMap,
@@ -51,10 +53,15 @@ impl Kernel {
         Self::NextLevel,
     ];
 
+    pub(super) fn is_volume(self) -> bool {
+        matches!(self, Self::Billow | Self::Wisp | Self::Shape | Self::VolumeMip)
+    }
+
     fn entry_point(self) -> &'static str {
         match self {
             Self::Billow => "billow",
             Self::Wisp => "wisp",
+            Self::Shape => "shape",
             Self::VolumeMip => "mip",
             Self::Coverage => "coverage",
             Self::TypeMap => "type_map",
@@ -66,7 +73,7 @@ impl Kernel {
 
     fn shader(self, assets: &AssetServer) -> Handle<Shader> {
         match self {
-            Self::Billow | Self::Wisp => load_embedded_asset!(assets, "volumes.wesl"),
+            Self::Billow | Self::Wisp | Self::Shape => load_embedded_asset!(assets, "volumes.wesl"),
             Self::VolumeMip => load_embedded_asset!(assets, "volume_mip.wesl"),
             Self::Coverage | Self::TypeMap | Self::Gradient => {
                 load_embedded_asset!(assets, "maps.wesl")
@@ -82,7 +89,7 @@ impl Kernel {
         let write = StorageTextureAccess::WriteOnly;
         let compute = ShaderStages::COMPUTE;
         match self {
-            Self::Billow | Self::Wisp => BindGroupLayoutDescriptor::new(
+            Self::Billow | Self::Wisp | Self::Shape => BindGroupLayoutDescriptor::new(
                 "cloud_volume_layout",
                 &BindGroupLayoutEntries::sequential(compute, (params, texture_storage_3d(VOLUME_FORMAT, write))),
             ),
@@ -110,7 +117,7 @@ impl Kernel {
 
 /// All of them, queued when a device is acquired.
 #[derive(Resource)]
-pub(super) struct BakePipelines([(BindGroupLayoutDescriptor, CachedComputePipelineId); 8]);
+pub(super) struct BakePipelines([(BindGroupLayoutDescriptor, CachedComputePipelineId); 9]);
 
 impl BakePipelines {
     pub(super) fn get(&self, kernel: Kernel) -> &(BindGroupLayoutDescriptor, CachedComputePipelineId) {

@@ -7,7 +7,7 @@ use std::sync::{
 
 use bevy::prelude::*;
 
-use super::slots::SlotStates;
+use super::{slots::SlotStates, weather_maps::LayerMaps};
 
 /// How far the baking of textures is. Read it to wait for them or to show a bar; writing to it does nothing.
 ///
@@ -79,11 +79,16 @@ impl ProgressCells {
 }
 
 /// Runs first in the frame, so that what was asked for in the last frame already counts.
-pub(super) fn report(progress: Res<Progress>, slots: Res<SlotStates>, mut status: ResMut<CloudTextureStatus>) {
+pub(super) fn report(
+    progress: Res<Progress>,
+    slots: Res<SlotStates>,
+    maps: Res<LayerMaps>,
+    mut status: ResMut<CloudTextureStatus>,
+) {
     let cells = &progress.0;
     let enabled = cells.enabled.load(Relaxed);
     let working = enabled && cells.asked.load(Relaxed) != cells.done.load(Relaxed);
-    let baking = working || enabled && slots.loading;
+    let baking = working || enabled && (slots.loading || maps.published().pending);
     let now = CloudTextureStatus {
         baking,
         progress: if working { f32::from_bits(cells.share_bits.load(Relaxed)).min(0.999) } else { 1.0 },

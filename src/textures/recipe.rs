@@ -58,6 +58,8 @@ fn octaves(kernel: Kernel, size: u32, cells: u32) -> u32 {
 fn texel_cost(kernel: Kernel, octaves: u32) -> u64 {
     match kernel {
         Kernel::Billow | Kernel::Wisp => octaves.into(),
+        // Those of both noises.
+        Kernel::Shape => (2 * octaves).into(),
         // Up to four octaves of Worley noise, then those of Perlin noise.
         Kernel::Coverage => (octaves.min(4) + octaves).into(),
         Kernel::TypeMap => octaves.into(),
@@ -79,6 +81,13 @@ impl Recipe {
             CloudTextureSlot::Coverage => map(Kernel::Coverage, settings.coverage_cells),
             CloudTextureSlot::TypeMap => map(Kernel::TypeMap, settings.type_cells),
             CloudTextureSlot::Gradient => Self::Gradient,
+            CloudTextureSlot::Shape => volume(Kernel::Shape, settings.shape_cells),
+            CloudTextureSlot::Detail => Self::Volume {
+                kernel: Kernel::Billow,
+                seed: seed.wrapping_add(1),
+                size: (volume_size / 4).max(32),
+                cells: settings.detail_cells,
+            },
             CloudTextureSlot::BlueNoise => return None,
         })
     }
@@ -173,7 +182,7 @@ pub(super) struct Pass {
 
 impl Pass {
     fn new(kernel: Kernel, level: u32, size: UVec3, octaves: u32) -> Self {
-        let is_volume = matches!(kernel, Kernel::Billow | Kernel::Wisp | Kernel::VolumeMip);
+        let is_volume = kernel.is_volume();
         let (bands, rows) = if is_volume { (size.z, size.y) } else { (size.y.div_ceil(GROUP), size.y.min(GROUP)) };
         let band_cost = u64::from(size.x) * u64::from(rows) * texel_cost(kernel, octaves);
         Self { kernel, level, size, bands, band_cost }
@@ -183,7 +192,7 @@ impl Pass {
     pub(super) fn dispatch(&self, from: u32, bands: u32) -> ([u32; 3], u32) {
         let across = self.size.x.div_ceil(GROUP);
         match self.kernel {
-            Kernel::Billow | Kernel::Wisp | Kernel::VolumeMip => ([across, self.size.y.div_ceil(GROUP), bands], from),
+            kernel if kernel.is_volume() => ([across, self.size.y.div_ceil(GROUP), bands], from),
             _ => ([across, bands, 1], from * GROUP),
         }
     }

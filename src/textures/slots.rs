@@ -28,6 +28,10 @@ pub enum CloudTextureSlot {
     Gradient,
     /// [`CloudTextureSlots::blue_noise`].
     BlueNoise,
+    /// [`CloudTextureSlots::shape`].
+    Shape,
+    /// [`CloudTextureSlots::detail`].
+    Detail,
 }
 
 impl std::fmt::Display for CloudTextureSlot {
@@ -39,16 +43,26 @@ impl std::fmt::Display for CloudTextureSlot {
             Self::TypeMap => "type_map",
             Self::Gradient => "gradient",
             Self::BlueNoise => "blue_noise",
+            Self::Shape => "shape",
+            Self::Detail => "detail",
         })
     }
 }
 
 impl CloudTextureSlot {
-    pub(crate) const COUNT: usize = 6;
+    pub(crate) const COUNT: usize = 8;
 
     /// All slots, the quick ones first.
-    pub(super) const BAKE_ORDER: [Self; Self::COUNT] =
-        [Self::BlueNoise, Self::Gradient, Self::Coverage, Self::TypeMap, Self::Billow, Self::Wisp];
+    pub(super) const BAKE_ORDER: [Self; Self::COUNT] = [
+        Self::BlueNoise,
+        Self::Gradient,
+        Self::Coverage,
+        Self::TypeMap,
+        Self::Detail,
+        Self::Billow,
+        Self::Wisp,
+        Self::Shape,
+    ];
 
     /// Those that say where cloud is.
     pub(crate) const OF_MODEL: [Self; 5] = [Self::Gradient, Self::Coverage, Self::TypeMap, Self::Billow, Self::Wisp];
@@ -61,19 +75,26 @@ impl CloudTextureSlot {
             Self::TypeMap => &slots.type_map,
             Self::Gradient => &slots.gradient,
             Self::BlueNoise => &slots.blue_noise,
+            Self::Shape => &slots.shape,
+            Self::Detail => &slots.detail,
         }
         .as_ref()
     }
 
     fn is_volume(self) -> bool {
-        matches!(self, Self::Billow | Self::Wisp)
+        matches!(self, Self::Billow | Self::Wisp) || self.is_of_layers()
+    }
+
+    /// Whether only weather-map layers read it: it is not baked before there is one.
+    pub(super) fn is_of_layers(self) -> bool {
+        matches!(self, Self::Shape | Self::Detail)
     }
 
     /// Formats that can be filtered on every device and have the channels that are read.
     fn formats(self) -> &'static [TextureFormat] {
         use TextureFormat::{R8Unorm, R16Float, Rg8Unorm, Rg16Float, Rgba8Unorm, Rgba16Float};
         match self {
-            Self::Billow | Self::Wisp | Self::BlueNoise => &[Rgba8Unorm, Rgba16Float],
+            Self::Billow | Self::Wisp | Self::BlueNoise | Self::Shape | Self::Detail => &[Rgba8Unorm, Rgba16Float],
             _ => &[R8Unorm, Rg8Unorm, Rgba8Unorm, R16Float, Rg16Float, Rgba16Float],
         }
     }
@@ -81,7 +102,7 @@ impl CloudTextureSlot {
     /// Sides that are allowed, in texels.
     fn sizes(self) -> RangeInclusive<u32> {
         match self {
-            Self::Billow | Self::Wisp => 4..=512,
+            Self::Billow | Self::Wisp | Self::Shape | Self::Detail => 4..=512,
             Self::Coverage | Self::TypeMap => 4..=MAX_MAP_SIZE,
             Self::Gradient => 2..=4096,
             Self::BlueNoise => 4..=1024,

@@ -38,10 +38,10 @@ fn is_bare(app: &App, view: &View) -> bool {
 }
 
 /// One bad change: what the error says, and the change.
-type Bad<S> = (&'static str, fn(&mut S));
+pub type Bad<S> = (&'static str, fn(&mut S));
 
 /// Makes each change, and asks that it be reported and the picture stay as it is.
-fn refuses<S>(app: &mut App, view: &View, changes: &[Bad<S>])
+pub fn refuses<S>(app: &mut App, view: &View, changes: &[Bad<S>])
 where
     S: Resource<Mutability = Mutable> + Validate + Clone,
 {
@@ -218,6 +218,62 @@ fn a_camera_that_is_nowhere_shows_no_clouds() {
             app.world_mut().entity_mut(view.camera).insert(looking_up());
         },
     );
+}
+
+#[test]
+fn transforms_that_are_no_place_show_no_clouds() {
+    // Out of this universe, and turned inside out: one camera through all of it. A rotation that is not a number, no size
+    // and a place at infinity are not tried: Bevy itself asserts there.
+    let (mut app, view) = above_one_camera();
+    let picture = linear_pixels(&app, &view);
+    let nowhere = [
+        Transform::from_xyz(0.0, -1e30, 1e30),
+        Transform::from_xyz(f32::NAN, f32::NAN, f32::NAN),
+        looking_up().with_scale(Vec3::new(-1.0, 1.0, 1e-20)),
+    ];
+    for place in nowhere {
+        app.world_mut().entity_mut(view.camera).insert(place);
+        settle(&mut app);
+        let seen = linear_pixels(&app, &view);
+        assert!(seen.iter().all(|p| p.is_finite()), "{place:?}: {seen:?}");
+        app.world_mut().entity_mut(view.camera).insert(looking_up());
+        settle(&mut app);
+        assert_eq!(linear_pixels(&app, &view), picture, "{place:?}: not the same once mended");
+    }
+}
+
+#[test]
+fn an_infinite_far_plane_changes_nothing() {
+    let (mut app, view) = above_one_camera();
+    let picture = linear_pixels(&app, &view);
+    let endless = PerspectiveProjection { far: f32::INFINITY, ..default() };
+    set_projection(&mut app, &view, Projection::Perspective(endless));
+    settle(&mut app);
+    assert_eq!(linear_pixels(&app, &view), picture);
+}
+
+#[test]
+fn a_bad_frame_leaves_no_trace_in_what_is_held() {
+    for temporal in [TemporalMode::SlidingWindow, TemporalMode::Exponential, TemporalMode::Upscale] {
+        let (mut app, view) = above_one_camera();
+        app.insert_resource(CloudQuality { temporal, offsets: true, ..exact(MarchResolution::Full) });
+        settle(&mut app);
+        run_updates(&mut app, 16);
+        let before = cloud_pixels(&app, &view);
+        for spoilt in [Transform::from_xyz(0.0, f32::NAN, 0.0), Transform::from_xyz(0.0, 1e30, 0.0)] {
+            app.world_mut().entity_mut(view.camera).insert(spoilt);
+            run_updates(&mut app, 1);
+            app.world_mut().entity_mut(view.camera).insert((looking_up(), bevy::camera::Exposure { ev100: f32::NAN }));
+            run_updates(&mut app, 1);
+            app.world_mut().entity_mut(view.camera).insert(bevy::camera::Exposure { ev100: 13.0 });
+            run_updates(&mut app, 17);
+            for (now, before) in cloud_pixels(&app, &view).iter().zip(&before) {
+                assert!(now.is_finite(), "{temporal:?}: {now}");
+                let off = (*now - *before).abs().max_element() / before.max_element();
+                assert!(off < 0.05, "{temporal:?}: {now}, before {before}");
+            }
+        }
+    }
 }
 
 #[test]

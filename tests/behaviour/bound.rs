@@ -11,9 +11,9 @@ use crate::{
 };
 
 /// One question: p and lod for the bound, q and its lod for the medium.
-type Question = [f32; 8];
+pub type Question = [f32; 8];
 /// Bound, density, extinction, profile, bound of the extinction.
-type Answer = [f32; 5];
+pub type Answer = [f32; 5];
 
 const IMPORTS: &str = "import bevy_cumulus::model::model::{density_bound, extinction_bound, sample_medium};";
 const ASK: &str = "
@@ -27,7 +27,7 @@ const ASK: &str = "
     results[o + 4u] = extinction_bound(p, values[i + 3u]);";
 
 /// An app whose textures are baked. No camera: the model does without.
-fn model_app() -> App {
+pub fn model_app() -> App {
     let mut app = clouds_app();
     run_until(&mut app, "the textures are baked", 600, |app| {
         !app.world().resource::<CloudTextureStatus>().baking && ModelShader::bindings(app, DVec3::ZERO).is_ok()
@@ -38,7 +38,7 @@ fn model_app() -> App {
     app
 }
 
-fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer> {
+pub fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer> {
     app.insert_resource(model.clone());
     let camera = DVec3::new(12_345.0, 10.0, -6789.0);
     let group = ModelShader::bindings(app, camera).expect("the model can be bound");
@@ -46,7 +46,7 @@ fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer>
 }
 
 /// A point in the layer or around it, within 60 km.
-fn point(rng: &mut StdRng, model: &CloudModel) -> Vec3 {
+pub fn point(rng: &mut StdRng, model: &CloudModel) -> Vec3 {
     let away = 10_f32.powf(rng.random_range(1.0..4.8));
     let angle: f32 = rng.random_range(0.0..std::f32::consts::TAU);
     // What the surface falls away by: d²/2R.
@@ -57,7 +57,7 @@ fn point(rng: &mut StdRng, model: &CloudModel) -> Vec3 {
 }
 
 /// A question whose q lies within 2^lod metres of p, as often near as far, and asks at most as coarsely.
-fn question(rng: &mut StdRng, model: &CloudModel) -> Question {
+pub fn question(rng: &mut StdRng, model: &CloudModel) -> Question {
     let p = point(rng, model);
     let lod: f32 = rng.random_range(-1.0..13.0);
     let direction = loop {
@@ -117,7 +117,7 @@ fn nothing_is_denser_than_the_bound_around_it() {
 }
 
 /// Points only: p and q are one.
-fn at(p: Vec3, lod: f32) -> Question {
+pub fn at(p: Vec3, lod: f32) -> Question {
     [p.x, p.y, p.z, lod, p.x, p.y, p.z, lod]
 }
 

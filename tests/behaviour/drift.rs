@@ -137,6 +137,10 @@ impl Accumulation {
             })
         };
         let (uniform, held) = (uniform(place_of("size").1 as u64), uniform(HELD_BYTES));
+        // No held frame's exposure is another.
+        let mut terms = [[0.0_f32; 4]; 16];
+        terms.iter_mut().for_each(|term| term[3] = 1.0);
+        world.resource::<RenderQueue>().write_buffer(&held, 16 * 64, bytemuck::cast_slice(&terms));
         let frames = texture(TextureFormat::Rgba16Float, LAYERS);
         let sums = [0, 1].map(|_| texture(TextureFormat::Rgba32Float, 1));
         let marched = texture(TextureFormat::R32Uint, LAYERS);

@@ -202,6 +202,18 @@ pub fn run_compute_with(
     output_len: usize,
     invocations: u32,
 ) -> Vec<f32> {
+    run_compute_with_groups(app, wesl, group_1.map_or(&[], std::slice::from_ref), input, output_len, invocations)
+}
+
+/// As [`run_compute`], with bind groups of the caller's from group 1 on.
+pub fn run_compute_with_groups(
+    app: &mut App,
+    wesl: &str,
+    others: &[(BindGroupLayoutDescriptor, BindGroup)],
+    input: &[f32],
+    output_len: usize,
+    invocations: u32,
+) -> Vec<f32> {
     let own = BindGroupLayoutDescriptor::new(
         "test compute",
         &BindGroupLayoutEntries::sequential(
@@ -210,10 +222,10 @@ pub fn run_compute_with(
         ),
     );
     let mut layouts = vec![own];
-    layouts.extend(group_1.map(|(layout, _)| layout.clone()));
+    layouts.extend(others.iter().map(|(layout, _)| layout.clone()));
     let pipeline = compile(app, wesl, &layouts);
-    let other = group_1.map(|(_, group)| group);
-    let result = dispatch(app, &pipeline, &layouts[0], other, input, output_len, invocations);
+    let groups: Vec<&BindGroup> = others.iter().map(|(_, group)| group).collect();
+    let result = dispatch(app, &pipeline, &layouts[0], &groups, input, output_len, invocations);
     // Errors of the commands above come out here.
     app.update();
     result
@@ -262,7 +274,7 @@ fn dispatch(
     app: &App,
     pipeline: &ComputePipeline,
     layout: &BindGroupLayoutDescriptor,
-    group_1: Option<&BindGroup>,
+    others: &[&BindGroup],
     input: &[f32],
     output_len: usize,
     invocations: u32,
@@ -290,8 +302,8 @@ fn dispatch(
         let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
         pass.set_pipeline(pipeline);
         pass.set_bind_group(0, &*group, &[]);
-        if let Some(other) = group_1 {
-            pass.set_bind_group(1, &**other, &[]);
+        for (i, other) in others.iter().enumerate() {
+            pass.set_bind_group(i as u32 + 1, &***other, &[]);
         }
         pass.dispatch_workgroups(invocations.div_ceil(64), 1, 1);
     }

@@ -7,7 +7,7 @@ use bevy_cumulus::{
     CloudNoise, CloudsPlugin, ModelShader,
     prelude::*,
     reference::{
-        phase::{HgDraine, Phase, hg},
+        phase::{HgDraine, Phase, hg, schlick_k},
         planet::PLANET_RADIUS,
     },
 };
@@ -25,7 +25,11 @@ const SKY: f64 = 1000.0;
 
 /// A uniform slab of this vertical optical depth; one albedo a colour channel.
 fn slab(depth: f64, albedo: [f64; 3]) -> ModelShader {
-    let [r, g, b] = albedo;
+    mixed_slab(depth, albedo, [1.0, 0.0, 0.0, 0.0])
+}
+
+/// The same, with these shares of the phase functions.
+pub fn mixed_slab(depth: f64, [r, g, b]: [f64; 3], [p, q, s, t]: [f64; 4]) -> ModelShader {
     let (top, extinction) = (BOTTOM + THICKNESS, depth / THICKNESS);
     ModelShader(format!(
         "import package::model::{{medium::{{Medium, empty_medium}}, planet::altitude}};
@@ -36,13 +40,14 @@ fn slab(depth: f64, albedo: [f64; 3]) -> ModelShader {
         fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
             let h = altitude(p, {PLANET_RADIUS:?});
             if h < {BOTTOM:?} || h > {top:?} {{ return empty_medium(); }}
-            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, 0.5);
+            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, vec2(500.0),
+                vec4({p:?}, {q:?}, {s:?}, {t:?}));
         }}"
     ))
 }
 
 /// Paths, a sky of radiance `sky` everywhere above, no ground bounce.
-fn traced_app(model: Option<ModelShader>, lighting: CloudLighting) -> App {
+pub fn traced_app(model: Option<ModelShader>, lighting: CloudLighting) -> App {
     let mut app = match model {
         Some(model) => clouds_app_with(move |app: &mut App| {
             app.insert_resource(model.clone()).add_plugins(CloudsPlugin);
@@ -55,18 +60,18 @@ fn traced_app(model: Option<ModelShader>, lighting: CloudLighting) -> App {
 }
 
 /// Light by the sky alone: the sun stands below the ground.
-fn sky_light(phase: PhaseFunction) -> CloudLighting {
+pub fn sky_light(phase: PhaseFunction) -> CloudLighting {
     let fallback = (SKY / f64::from(lux::RAW_SUNLIGHT)) as f32;
     CloudLighting { phase, sky_fallback: Vec3::splat(fallback), ground_albedo: Vec3::ZERO, ..default() }
 }
 
 /// Light by the sun alone.
-fn sun_light(phase: PhaseFunction) -> CloudLighting {
+pub fn sun_light(phase: PhaseFunction) -> CloudLighting {
     CloudLighting { sky_fallback: Vec3::ZERO, ..sky_light(phase) }
 }
 
 /// A camera that sees one direction: up by `mu`, the cosine to the vertical, from just outside the slab.
-fn spawn_pinhole(app: &mut App, size: UVec2, mu: f64) -> View {
+pub fn spawn_pinhole(app: &mut App, size: UVec2, mu: f64) -> View {
     let height = if mu > 0.0 { BOTTOM - 20.0 } else { BOTTOM + THICKNESS + 20.0 };
     let direction = DVec3::new((1.0 - mu * mu).max(0.0).sqrt(), mu, 0.0).as_vec3();
     let looking = Transform::from_xyz(0.0, height as f32, 0.0).looking_to(direction, Vec3::Z);
@@ -77,7 +82,7 @@ fn spawn_pinhole(app: &mut App, size: UVec2, mu: f64) -> View {
 }
 
 /// Mean radiance and transmittance after so many frames, one sample a pixel each.
-fn mean(app: &mut App, view: &View, frames: u32) -> [f64; 4] {
+pub fn mean(app: &mut App, view: &View, frames: u32) -> [f64; 4] {
     until_drawn(app);
     // A new start, so that as many samples are counted as were asked for.
     app.world_mut().get_mut::<CloudView>(view.camera).unwrap().reset += 1;
@@ -87,12 +92,12 @@ fn mean(app: &mut App, view: &View, frames: u32) -> [f64; 4] {
     sum.map(|s| s / pixels.len() as f64)
 }
 
-fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
+pub fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
     assert!((found / expected - 1.0).abs() < relative, "{what}: {found}, not {expected}");
 }
 
 /// Where the sun stands for its light to come from `mu` above the horizon, 90° to the side of the pinhole's direction.
-fn light_from(mu: f64) -> Vec3 {
+pub fn light_from(mu: f64) -> Vec3 {
     -DVec3::new(0.0, mu, (1.0 - mu * mu).sqrt()).as_vec3()
 }
 
@@ -242,6 +247,10 @@ fn directions_follow_the_phase_function() {
         Phase::HenyeyGreenstein { g: -0.4 },
         Phase::TwoLobe { g: 0.8, g_back: -0.3, mix: 0.3 },
         draine,
+        Phase::Rayleigh,
+        Phase::CornetteShanks { g: 0.7 },
+        Phase::Schlick { k: schlick_k(0.75) },
+        Phase::Schlick { k: -0.4 },
     ];
     for phase in phases {
         let (kind, params) = phase.shader_parameters();

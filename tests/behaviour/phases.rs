@@ -4,7 +4,7 @@ use std::f64::consts::PI;
 
 use bevy::app::App;
 use bevy_cumulus::{
-    reference::phase::{HgDraine, Phase, draine, hg},
+    reference::phase::{HgDraine, Phase, cornette_shanks, draine, hg, rayleigh, schlick_k},
     settings::{CloudLighting, PhaseFunction, SettingsError},
 };
 use rand::{Rng, SeedableRng, rngs::StdRng};
@@ -50,11 +50,14 @@ fn rounded(phase: Phase) -> Phase {
         Phase::HenyeyGreenstein { .. } => Phase::HenyeyGreenstein { g: x },
         Phase::TwoLobe { .. } => Phase::TwoLobe { g: x, g_back: y, mix: z },
         Phase::HgDraine(_) => Phase::HgDraine(HgDraine { g_hg: x, g_d: y, alpha: z, w }),
+        Phase::Rayleigh => phase,
+        Phase::CornetteShanks { .. } => Phase::CornetteShanks { g: x },
+        Phase::Schlick { .. } => Phase::Schlick { k: x },
     }
 }
 
 fn random_phase(rng: &mut StdRng) -> Phase {
-    match rng.random_range(0..4) {
+    match rng.random_range(0..7) {
         0 => Phase::Isotropic,
         1 => Phase::HenyeyGreenstein { g: rng.random_range(-0.998..0.998) },
         2 => Phase::TwoLobe {
@@ -62,6 +65,9 @@ fn random_phase(rng: &mut StdRng) -> Phase {
             g_back: rng.random_range(-0.99..0.99),
             mix: rng.random_range(0.0..=1.0),
         },
+        3 => Phase::Rayleigh,
+        4 => Phase::CornetteShanks { g: rng.random_range(-0.99..0.99) },
+        5 => Phase::Schlick { k: schlick_k(rng.random_range(-0.99..0.99)) },
         _ => Phase::HgDraine(HgDraine::from_diameter(rng.random_range(5.0..=50.0)).unwrap()),
     }
 }
@@ -81,6 +87,13 @@ fn every_phase() -> Vec<Phase> {
         droplets(5.0),
         droplets(12.0),
         droplets(50.0),
+        Phase::Rayleigh,
+        Phase::CornetteShanks { g: 0.0 },
+        Phase::CornetteShanks { g: 0.8 },
+        Phase::CornetteShanks { g: -0.99 },
+        Phase::Schlick { k: schlick_k(0.8) },
+        Phase::Schlick { k: schlick_k(-0.5) },
+        Phase::Schlick { k: schlick_k(0.99) },
     ]
 }
 
@@ -215,13 +228,12 @@ fn draine_spans_the_classic_phase_functions() {
     for step in -10..=10 {
         let cosine = f64::from(step) / 10.0;
         let (g, square) = (0.7_f64, cosine * cosine);
-        let cornette_shanks = 3.0 * (1.0 - g * g) * (1.0 + square)
+        let by_hand = 3.0 * (1.0 - g * g) * (1.0 + square)
             / (8.0 * PI * (2.0 + g * g) * (1.0 + g * g - 2.0 * g * cosine).powf(1.5));
-        let rayleigh = 3.0 * (1.0 + square) / (16.0 * PI);
         for (found, expected) in [
             (draine(g, 0.0, cosine), hg(g, cosine)),
-            (draine(g, 1.0, cosine), cornette_shanks),
-            (draine(0.0, 1.0, cosine), rayleigh),
+            (cornette_shanks(g, cosine), by_hand),
+            (rayleigh(cosine), 3.0 * (1.0 + square) / (16.0 * PI)),
         ] {
             assert!((found / expected - 1.0).abs() < 1e-12, "cosθ {cosine}: {found}, not {expected}");
         }

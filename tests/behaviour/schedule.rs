@@ -64,7 +64,7 @@ fn no_system_of_ours_is_ambiguous() {
 }
 
 #[test]
-fn passes_run_after_the_scene_and_before_tone_mapping() {
+fn passes_run_after_the_opaque_scene_and_before_tone_mapping() {
     // Recording commands conflicts with nothing, so ambiguity detection does not see this order.
     let app = drawn();
     let schedules = app.sub_app(RenderApp).world().resource::<Schedules>();
@@ -77,11 +77,15 @@ fn passes_run_after_the_scene_and_before_tone_mapping() {
         .collect();
     let wanted = [
         "::main_opaque_pass_3d",
-        "::main_transparent_pass_3d",
+        "::main_transmissive_pass_3d",
         "::cloud_sky",
         "::cloud_light",
         "::cloud_accumulate",
         "::cloud_composite",
+        "::main_transparent_pass_3d",
+        "::cloud_draw_over<false>",
+        "::temporal_anti_alias",
+        "::cloud_draw_over<true>",
         "::tonemapping",
         "::upscaling",
     ];
@@ -92,7 +96,7 @@ fn passes_run_after_the_scene_and_before_tone_mapping() {
             .unwrap_or_else(|| panic!("{name} is not in Core3d: {order:#?}"))
     });
     assert!(places.is_sorted(), "{wanted:?} run at {places:?}");
-    // The sky is drawn before what lies in front of it.
+    // The sky is drawn before the pass that may draw clouds.
     let sky = order.iter().position(|system| system.ends_with("::render_sky"));
-    assert!(sky.is_some_and(|sky| sky < places[2]), "render_sky runs at {sky:?}");
+    assert!(sky.is_some_and(|sky| sky < places[6]), "render_sky runs at {sky:?}");
 }

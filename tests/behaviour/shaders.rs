@@ -81,11 +81,11 @@ fn every_variant_compiles_and_draws() {
                 if msaa != Msaa::Off {
                     defs.insert("MULTISAMPLED".to_owned());
                 }
-                for stage in ["cloud_sky", "cloud_march", "cloud_accumulate", "cloud_publish"] {
+                for stage in ["cloud_sky", "cloud_march", "cloud_accumulate", "cloud_composite", "cloud_publish"] {
                     wanted.insert((stage.to_owned(), defs.clone(), String::new()));
                 }
                 let format = if hdr { "Rgba16Float" } else { "Rgba8UnormSrgb" };
-                wanted.insert(("cloud_composite".to_owned(), defs, format.to_owned()));
+                wanted.insert(("cloud_draw".to_owned(), BTreeSet::new(), format.to_owned()));
             }
         }
     }

@@ -46,7 +46,8 @@ fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
     if h < {BOTTOM:?} || h > {TOP:?} {{
         return empty_medium();
     }}
-    return Medium(1.0, {extinction:?}, vec3<f32>({:?}, {:?}, {:?}), 1.0, (h - {BOTTOM:?}) / 1000.0);
+    return Medium(1.0, {extinction:?}, vec3<f32>({:?}, {:?}, {:?}), 1.0, vec2(h - {BOTTOM:?}, {TOP:?} - h),
+        vec4<f32>(1.0, 0.0, 0.0, 0.0));
 }}
 ",
         ALBEDO[0], ALBEDO[1], ALBEDO[2]
@@ -369,7 +370,9 @@ fn the_model_knows_nothing_of_the_renderer() {
                     "medium",
                     "Medium",
                     "planet",
+                    "MOST_DECKS",
                     "model_bounds",
+                    "model_deck",
                     "density_bound",
                     "sample_medium",
                     "empty_medium",

@@ -28,8 +28,10 @@ pub fn slab(bottom: f32, top: f32, extinction: f32) -> ModelShader {
         fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
             let height = (altitude(p, 6360000.0) - {bottom:?}) / {:?};
             if height < 0.0 || height > 1.0 {{ return empty_medium(); }}
-            return Medium(1.0, {extinction:?}, vec3(0.99), 0.5, height);
+            return Medium(1.0, {extinction:?}, vec3(0.99), 0.5, vec2(height, 1.0 - height) * {:?},
+                vec4(1.0, 0.0, 0.0, 0.0));
         }}",
+        top - bottom,
         top - bottom
     ))
 }

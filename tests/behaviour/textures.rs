@@ -26,6 +26,8 @@ const SMALL: CloudTextures = CloudTextures {
     wisp_cells: 4,
     coverage_cells: 7,
     type_cells: 6,
+    shape_cells: 4,
+    detail_cells: 4,
 };
 
 fn app(settings: CloudTextures) -> App {

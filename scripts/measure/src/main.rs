@@ -1,7 +1,8 @@
 //! Judges bevy_cumulus: what each approximation costs in truth and in time.
 //!
-//! `fidelity` and `ladder` drive the `headless` example (`engine`), compare its pictures (`metrics`) with references
-//! (`truth`) and write tables and plots. `scripts/fidelity` and `scripts/ladder` build and start it.
+//! `fidelity`, `ladder` and `motion` drive the `headless` example (`engine`), compare its pictures (`metrics`) with references
+//! (`truth`) and write tables and plots. `scripts/fidelity`, `scripts/ladder` and
+//! `scripts/motion` build and start it.
 
 mod backdrop;
 mod engine;
@@ -10,6 +11,7 @@ mod ladder;
 mod machine;
 mod markdown;
 mod metrics;
+mod motion;
 mod picture;
 mod plot;
 mod progress;
@@ -43,6 +45,8 @@ enum What {
     Fidelity(fidelity::Options),
     /// The thesis's ladder of optimisations, and cost studies: LADDER.md
     Ladder(ladder::Options),
+    /// Each temporal mode in motion: MOTION.md
+    Motion(motion::Options),
     /// Errors of one picture against another; both are STEM.png and STEM.exr
     Compare { truth: PathBuf, test: PathBuf },
 }
@@ -148,6 +152,7 @@ fn main() -> ExitCode {
     let result = match Options::parse().what {
         What::Fidelity(options) => fidelity::run(&options),
         What::Ladder(options) => ladder::run(&options),
+        What::Motion(options) => motion::run(&options),
         What::Compare { truth, test } => compare(&truth, &test),
     };
     match result {

@@ -49,7 +49,7 @@ pub fn decode(code: u8) -> f64 {
     if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
-/// The sRGB code of light.
+/// The sRGB code of linear light.
 pub fn encode(v: f64) -> u8 {
     let s = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
     (s * 255.0).round().clamp(0.0, 255.0) as u8

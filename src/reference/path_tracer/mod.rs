@@ -7,12 +7,13 @@ use bevy::{
     shader::load_shader_library,
 };
 
-use crate::render::{FrameUniform, depth_layout};
+use crate::render::{FrameUniform, depth_layout, phase_tables_layout};
 
 pub(crate) fn add_shaders(app: &mut App) {
     load_shader_library!(app, "luminance.wesl");
     load_shader_library!(app, "rng.wesl");
     load_shader_library!(app, "scatter.wesl");
+    load_shader_library!(app, "events.wesl");
     load_shader_library!(app, "tracking.wesl");
     load_shader_library!(app, "paths.wesl");
     embedded_asset!(app, "path_trace.wesl");
@@ -34,17 +35,19 @@ impl FromWorld for PathTracer {
         let trace = |multisampled| {
             BindGroupLayoutDescriptor::new(
                 "cloud_path_trace",
-                &BindGroupLayoutEntries::sequential(
+                &BindGroupLayoutEntries::with_indices(
                     ShaderStages::COMPUTE,
                     (
-                        uniform_buffer::<FrameUniform>(false),
-                        unfiltered(),
-                        unfiltered(),
-                        depth_layout(multisampled),
-                        write(TextureFormat::Rgba32Float),
-                        write(TextureFormat::Rg32Float),
-                        uniform_buffer::<Mat4>(false),
-                        write(TextureFormat::Rgba32Float),
+                        (0, uniform_buffer::<FrameUniform>(false)),
+                        (1, unfiltered()),
+                        (2, unfiltered()),
+                        (3, depth_layout(multisampled)),
+                        (4, write(TextureFormat::Rgba32Float)),
+                        (5, write(TextureFormat::Rgba32Float)),
+                        (6, uniform_buffer::<Mat4>(false)),
+                        (7, write(TextureFormat::Rgba32Float)),
+                        // The march's number: they share the shader module.
+                        (10, phase_tables_layout()),
                     ),
                 ),
             )
