@@ -21,10 +21,11 @@ use crate::{
 
 /// Sources that the path-traced picture follows from. What only the march reads is left out, so that tuning it keeps
 /// the references.
-const SOURCES: [&str; 7] = [
+const SOURCES: [&str; 8] = [
     "src/model",
     "src/textures",
     "src/render/sky",
+    "src/phases",
     "src/reference/path_tracer",
     "src/render/march/phase.wesl",
     "src/render/march/aerial.wesl",
