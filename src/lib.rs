@@ -62,7 +62,8 @@ pub use reference::{
 pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
-    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, ModelPhases,
+    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, CloudWeather, CloudZone,
+    ModelPhases,
 };
 
 /// What most users need.
@@ -71,8 +72,8 @@ pub mod prelude {
         CloudBuffer, CloudDepth, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
             CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudMethod, CloudModel, CloudOrder,
-            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion,
-            Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
+            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView,
+            CloudWeather, CloudZone, Erosion, Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
         },
         weather::{WeatherMap, WeatherRecipe},
     };

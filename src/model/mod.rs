@@ -10,12 +10,16 @@ mod lines;
 mod probe;
 mod space;
 mod uniform;
+mod zone_at;
 
 use bevy::{prelude::*, shader::load_shader_library};
 
 pub(crate) use bindings::ModelBindings;
+pub(crate) use layers::decks;
+pub(crate) use layers::{MAX_ZONES, ZoneUniform};
 pub(crate) use space::TangentFrame;
 pub(crate) use uniform::{ModelSettings, ModelUniform, TexelSizes};
+pub(crate) use zone_at::ZoneAt;
 
 /// Path whose module path is the model's: a shader registered under it takes the built-in one's place.
 const MODEL_PATH: &str = "embedded://bevy_cumulus/model/model.wesl";

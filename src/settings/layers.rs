@@ -171,6 +171,9 @@ pub struct CloudLayer {
     /// Clouds dissolve and others form where a slow wave passes: its speed over the map (m/s). Default 1.5.
     #[reflect(@-50.0..=50.0_f32)]
     pub renewal: f32,
+    /// How far that wave has come at time zero (m, f64). Transitions keep clouds from jumping with it. Default 0.
+    #[reflect(@-1.0e12..=1.0e12_f32)]
+    pub renewal_drift: f64,
     /// Where the layer is at time zero (m, f64). Transitions keep a sky in place with it. Default 0.
     #[reflect(@-1.0e12..=1.0e12_f32)]
     pub drift: DVec3,
@@ -223,6 +226,7 @@ impl Default for CloudLayer {
             wind_skew: 250.0,
             evolution: 0.8,
             renewal: 1.5,
+            renewal_drift: 0.0,
             drift: DVec3::ZERO,
         }
     }

@@ -19,7 +19,7 @@ use bevy::{
 
 use super::bake::CloudTextureViews;
 use crate::{
-    settings::{CloudLayer, GoodSettings, MAX_LAYERS, MapChannels},
+    settings::{CloudLayer, CloudWeather, GoodSettings, MAX_LAYERS, MapChannels},
     weather::{Swirl, WeatherMap, WeatherPyramid, WeatherRecipe},
 };
 
@@ -188,6 +188,7 @@ fn of_channels(map: WeatherMap, channels: MapChannels) -> WeatherMap {
 /// Follows the layers: makes what they ask for, forgets what nobody does.
 pub(super) fn follow_layers(
     good: Res<GoodSettings>,
+    weather: Option<Res<CloudWeather>>,
     assets: Option<Res<AssetServer>>,
     images: Res<Assets<Image>>,
     mut changes: MessageReader<AssetEvent<Image>>,
@@ -200,11 +201,13 @@ pub(super) fn follow_layers(
             *revision += 1;
         }
     }
-    if good.0.layers.0.is_empty() && maps.entries.is_empty() {
+    let is_ahead = weather.as_ref().is_some_and(|weather| weather.layers_ahead(good.0.clock.seconds).next().is_some());
+    if good.0.layers.0.is_empty() && maps.entries.is_empty() && !is_ahead {
         maps.published.pending = false;
         return;
     }
     let images = Images { loaded: &images, server: assets.as_deref() };
+    let in_transition = weather.as_ref().is_some_and(|weather| weather.has_moved());
     let mut wanted = Vec::new();
     let mut pending = false;
     let mut changed = false;
@@ -222,7 +225,13 @@ pub(super) fn follow_layers(
                     changed = true;
                 }
             }
-            Ok(None) => pending = true,
+            Ok(None) => {
+                pending = true;
+                // A layer that forms must not show with another's map and then with its own.
+                if in_transition && maps.shown[i].take_if(|(now, _)| *now != source).is_some() {
+                    changed = true;
+                }
+            }
             Err(reason) => {
                 if !maps.told.contains(&source) {
                     error!("clouds: layers.{i}.{reason}; the last good map stays");
@@ -231,6 +240,14 @@ pub(super) fn follow_layers(
             }
         }
         wanted.push(source);
+    }
+    for layer in weather.iter().flat_map(|weather| weather.layers_ahead(good.0.clock.seconds)) {
+        let source = maps.source(layer, assets.as_deref());
+        if !wanted.contains(&source) {
+            // What is wrong with it is told when its layer is shown.
+            let _ = maps.find(&source, &images);
+            wanted.push(source);
+        }
     }
     maps.published.pending = pending;
     maps.told.retain(|source| wanted.contains(source));

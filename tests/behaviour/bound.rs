@@ -5,7 +5,8 @@ use bevy_cumulus::{ModelShader, prelude::*, textures::CloudTextureStatus};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::{
-    gpu::{run_compute_with, run_until, run_updates},
+    gpu::{run_until, run_updates},
+    twins::on_gpu_with,
     view::clouds_app,
 };
 
@@ -14,29 +15,16 @@ pub type Question = [f32; 8];
 /// Bound, density, extinction, profile, bound of the extinction.
 pub type Answer = [f32; 5];
 
+const IMPORTS: &str = "import bevy_cumulus::model::model::{density_bound, extinction_bound, sample_medium};";
 const ASK: &str = "
-import bevy_cumulus::model::model::{density_bound, extinction_bound, sample_medium};
-
-@group(0) @binding(0) var<storage, read> values: array<f32>;
-@group(0) @binding(1) var<storage, read_write> results: array<f32>;
-
-@compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.x * 8u;
-    if i >= arrayLength(&values) {
-        return;
-    }
     let p = vec3<f32>(values[i], values[i + 1u], values[i + 2u]);
     let q = vec3<f32>(values[i + 4u], values[i + 5u], values[i + 6u]);
     let medium = sample_medium(q, values[i + 7u]);
-    let o = id.x * 5u;
     results[o] = density_bound(p, values[i + 3u]);
     results[o + 1u] = medium.density;
     results[o + 2u] = medium.extinction;
     results[o + 3u] = medium.profile;
-    results[o + 4u] = extinction_bound(p, values[i + 3u]);
-}
-";
+    results[o + 4u] = extinction_bound(p, values[i + 3u]);";
 
 /// An app whose textures are baked. No camera: the model does without.
 pub fn model_app() -> App {
@@ -54,9 +42,7 @@ pub fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Ans
     app.insert_resource(model.clone());
     let camera = DVec3::new(12_345.0, 10.0, -6789.0);
     let group = ModelShader::bindings(app, camera).expect("the model can be bound");
-    let count = questions.len();
-    let answers = run_compute_with(app, ASK, Some(&group), questions.as_flattened(), 5 * count, count as u32);
-    answers.as_chunks().0.to_vec()
+    on_gpu_with(app, Some(&group), IMPORTS, ASK, questions)
 }
 
 /// A point in the layer or around it, within 60 km.

@@ -5,6 +5,7 @@ mod adding;
 mod bad_input;
 mod bound;
 mod cameras;
+mod change;
 mod debug_views;
 mod drift;
 mod field;
@@ -38,3 +39,4 @@ mod weather;
 mod window;
 #[cfg(target_os = "linux")]
 mod window_driven;
+mod zones;

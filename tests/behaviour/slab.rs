@@ -379,6 +379,7 @@ fn the_model_knows_nothing_of_the_renderer() {
                     "shell_intervals",
                     "shell_roots",
                     "altitude",
+                    "up_at",
                     "debug_value",
                 ];
                 assert!(known.contains(&name), "{path} imports {name} of the model");
