@@ -36,7 +36,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
     ),
     ("Light", &["density", "extinction", "albedo", "own_phase", "phase"]),
     ("Rain", &["rain", "rain_extinction", "rain_depth", "rain_slant"]),
-    ("Wind", &["wind", "wind_skew", "evolution", "renewal", "drift"]),
+    ("Wind", &["wind", "wind_skew", "evolution", "renewal", "drift", "renewal_drift"]),
 ];
 
 /// What the map is, which has a group of its own.

@@ -66,24 +66,35 @@ pub(super) fn check<'a>(source: &str, others: impl Iterator<Item = (AssetId<Shad
     match cache.get(0, place(LIBRARY.len() as u128 + 2), &[]) {
         Ok(text) => validate(source, &text),
         Err(ShaderCacheError::ShaderImportNotYetAvailable | ShaderCacheError::ShaderNotLoaded(_)) => Verdict::Waits,
-        Err(error) => {
-            let text = error.to_string();
-            let line = lines::named(&text, MODEL_PATH).or_else(|| missing(source, &text));
-            // The first line names the stage; what is left out of the rest shows the callers' text.
-            let what = text.lines().find_map(|line| line.strip_prefix("error: ")).unwrap_or(&text);
-            bad(line, what.to_owned())
-        }
+        Err(error) => refused(source, &error.to_string()),
     }
 }
 
-/// Line of a name that the composer cannot find, of which it says in which declaration it stands, but not where.
-fn missing(source: &str, message: &str) -> Option<usize> {
+/// What the composer says. It names the line, or only the declaration that it was at.
+fn refused(source: &str, message: &str) -> Verdict {
     let quoted = |before: &str| message.split_once(before)?.1.split('`').next();
-    lines::of_word(source, quoted("cannot find declaration of `")?, quoted("in declaration of `"))
+    // The other lines show where it was in the callers' text.
+    let what = message.lines().find_map(|line| line.strip_prefix("error: ")).unwrap_or(message);
+    let within = quoted("in declaration of `");
+    if let Some(verdict) = within.and_then(|name| of_caller(source, name, what)) {
+        return verdict;
+    }
+    let word = quoted("declaration of `").or(quoted("arguments to `")).map(lines::plain);
+    let line = lines::named(message, MODEL_PATH)
+        .or_else(|| lines::of_word(source, &word?, within))
+        .or_else(|| lines::of(source, within?));
+    bad(line, what.to_owned())
+}
+
+/// Where a caller is wrong, the function that it calls is of another type than the renderer's.
+fn of_caller(source: &str, caller: &str, reason: &str) -> Option<Verdict> {
+    let called = caller.strip_prefix("calls_")?;
+    let (name, values, gives, _) = FUNCTIONS.iter().find(|(name, ..)| *name == called)?;
+    Some(bad(lines::of(source, name), format!("{name} must give {gives} for ({values}): {reason}")))
 }
 
 fn bad(line: Option<usize>, reason: String) -> Verdict {
-    Verdict::Bad(ModelShaderError { line, reason })
+    Verdict::Bad(ModelShaderError { line, reason: lines::plain(&reason) })
 }
 
 fn place(k: u128) -> AssetId<Shader> {
@@ -141,20 +152,11 @@ fn chain(error: &dyn std::error::Error) -> String {
 
 /// The error, at the source's line from which the composed text has what is there.
 fn blame(source: &str, composed: &str, at: Option<usize>, reason: String) -> Verdict {
-    // As the composer lengthens names.
-    let reason = reason.replace("_1bevy_cumulus_model_model_", "").replace("_1bevy_cumulus_model_medium_", "");
-    let Some(at) = at else { return bad(None, reason) };
-    if let Some(line) = lines::in_source(source, composed, at) {
-        return bad(Some(line), reason);
-    }
-    // Where a caller is wrong, the function that it calls is of another type than the renderer's.
-    let before = composed[..at].rsplit("fn calls_").next().filter(|_| composed[..at].contains("fn calls_"));
-    let called = FUNCTIONS.iter().find(|(name, ..)| before.is_some_and(|text| text.starts_with(&format!("{name}("))));
-    match called {
-        Some((name, values, gives, _)) => {
-            bad(lines::of(source, name), format!("{name} must give {gives} for ({values}): {reason}"))
-        }
-        None => bad(None, reason),
+    let line = at.and_then(|at| lines::in_source(source, composed, at));
+    let caller = at.and_then(|at| composed[..at].rsplit_once("fn ")).and_then(|(_, text)| text.split('(').next());
+    match caller.filter(|_| line.is_none()).and_then(|caller| of_caller(source, caller, &reason)) {
+        Some(verdict) => verdict,
+        None => bad(line, reason),
     }
 }
 

@@ -62,6 +62,7 @@ fn a_mistake_is_found_on_its_line() {
         ("-> f32 { return 1.0; }", "-> vec2<f32> { return vec2(1.0); }", 9, "density_bound must give f32"),
     ] {
         let Verdict::Bad(error) = verdict(from, to) else { panic!("{to} passes") };
+        assert!(!error.reason.contains("_1"), "{to}: names are not as they were written: {error}");
         assert_eq!(error.line, Some(line), "{to}: {error}");
         assert!(error.reason.contains(says) && error.to_string().contains(&format!("line {line}: ")), "{to}: {error}");
     }

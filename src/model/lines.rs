@@ -5,6 +5,8 @@
 
 /// How the composer begins the names of what the model's module declares.
 const MODEL: &str = "model_model_";
+/// And those of its neighbours, before their module's name.
+const PACKAGE: &str = "_1bevy_cumulus_model_";
 /// What a declaration begins with.
 const KEYWORDS: [&str; 6] = ["fn", "struct", "const", "var", "alias", "override"];
 
@@ -18,6 +20,19 @@ struct Token<'a> {
 struct Declared<'a> {
     name: &'a str,
     tokens: &'a [Token<'a>],
+}
+
+/// The text with names as they were before the composer lengthened them.
+pub(super) fn plain(text: &str) -> String {
+    let mut parts = text.split(PACKAGE);
+    let mut plain = parts.next().unwrap_or_default().to_owned();
+    for part in parts {
+        // Behind the module's name.
+        let item = part.split_once('_').map_or(part, |(_, item)| item);
+        let counted = item.strip_prefix('_').map(|rest| rest.trim_start_matches(|c: char| c.is_ascii_digit()));
+        plain.push_str(counted.unwrap_or(item));
+    }
+    plain
 }
 
 /// Whether the source declares something of this name.

@@ -83,7 +83,8 @@ fn replace_model(
     mut waits: Local<bool>,
 ) {
     let more = loaded.read().any(|event| matches!(event, AssetEvent::Added { .. } | AssetEvent::Modified { .. }));
-    if !source.is_changed() && !(*waits && more) {
+    let asked = source.is_changed() || *waits && more;
+    if !asked {
         return;
     }
     let mut text = source.0.clone();

@@ -121,7 +121,8 @@ pub(crate) fn prepare_bind_groups(
     status: Res<StatusFlags>,
 ) {
     // What layers read comes after what the thesis's layer does.
-    let mut ready = !views.is_empty() && !textures.maps_pending && !(textures.bake_pending && textures.shape.is_none());
+    let layers_wait = textures.maps_pending || textures.bake_pending && textures.shape.is_none();
+    let mut ready = !views.is_empty() && !layers_wait;
     for item in &views {
         let own;
         let sky_light = match item.sky_light {

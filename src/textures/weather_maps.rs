@@ -211,8 +211,13 @@ pub(super) fn follow_layers(
     let mut wanted = Vec::new();
     let mut pending = false;
     let mut changed = false;
-    for (i, layer) in good.0.layers.shown() {
+    for (i, layer) in good.0.layers.0.iter().enumerate().take(MAX_LAYERS) {
         let source = maps.source(layer, images.server);
+        // The map of one that is hidden is kept: it may be shown again.
+        if !layer.enabled {
+            wanted.push(source);
+            continue;
+        }
         match maps.find(&source, &images) {
             Ok(Some(map)) => {
                 if maps.shown[i].as_ref().is_none_or(|(now, _)| *now != source) {

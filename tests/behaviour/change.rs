@@ -200,7 +200,7 @@ fn a_day_of_wind_jumps_nowhere_and_shapes_evolve() {
     let cumulus = preset("Cumulus");
     app.insert_resource(cumulus.model).insert_resource(cumulus.layers);
     let view = drawn(&mut app, up());
-    let mut picture = |app: &mut App, seconds: f64| {
+    let picture = |app: &mut App, seconds: f64| {
         app.world_mut().resource_mut::<CloudClock>().seconds = seconds;
         app.world_mut().get_mut::<CloudView>(view.camera).expect("a view").reset += 1;
         run_updates(app, 8);

@@ -69,7 +69,7 @@ fn the_examples_rings_keep_a_models_promises() {
     let mut app = model_app();
     app.insert_resource(ModelShader(include_str!("../../examples/custom_model/rings.wesl").to_owned()));
     run_updates(&mut app, 3);
-    let model = CloudModel { bottom: 620.0, top: 4580.0, map_scale: 12_000.0, ..default() };
+    let model = CloudModel { bottom: 620.0, top: 4580.0, map_scale: 5000.0, ..default() };
     let mut rng = StdRng::seed_from_u64(600);
     let questions: Vec<Question> = (0..40_000).map(|_| question(&mut rng, &model)).collect();
     let (mut empty, mut cloud) = (0, 0);
@@ -81,5 +81,5 @@ fn the_examples_rings_keep_a_models_promises() {
         cloud += u32::from(density > 0.0);
     }
     println!("{empty} certainly empty, {cloud} in cloud");
-    assert!(empty > 10_000 && cloud > 100, "{empty} certainly empty, {cloud} in cloud");
+    assert!(empty > 10_000 && cloud > 60, "{empty} certainly empty, {cloud} in cloud");
 }

@@ -231,8 +231,7 @@ fn every_path_takes_its_own_value_and_its_limits_and_no_more() {
             }
         }
     }
-    for path in ["", "model", "model.", "model.colour", "sky.coverage", "model.coverage.x", "layers.0", "layers.1.base"]
-    {
+    for path in ["", "model", "model.", "model.colour", "sky.coverage", "model.coverage.x", "layers.1.base"] {
         let error = CloudSettings::default().set(path, "1").unwrap_err();
         assert_eq!(error, SettingsError::UnknownPath(path.to_owned()));
     }
