@@ -19,7 +19,7 @@ pub(crate) const WAVES: [DVec2; 3] =
     [DVec2::new(2.4049, 0.8341), DVec2::new(-1.1823, 1.7329), DVec2::new(0.3719, -2.1317)];
 
 /// Fine fibres of a sheet repeat this much sooner than the coarse, as in `layer.wesl`.
-const FINER: f32 = 3.137;
+pub(crate) const FINER: f32 = 3.137;
 
 /// Texels along one side of the textures that layers read.
 #[derive(Clone, Copy, Debug, PartialEq)]

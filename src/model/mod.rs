@@ -12,6 +12,7 @@ mod uniform;
 use bevy::{prelude::*, shader::load_shader_library};
 
 pub(crate) use bindings::ModelBindings;
+pub(crate) use layers::{FINER, LayerSizes, LayerUniform, WAVES, ZoneUniform};
 pub(crate) use space::TangentFrame;
 pub(crate) use uniform::{ModelSettings, ModelUniform, TexelSizes};
 
