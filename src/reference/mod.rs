@@ -27,5 +27,5 @@ pub mod profile;
 pub mod quadrature;
 pub mod query;
 pub mod sampler;
-mod texture_set;
+pub(crate) mod texture_set;
 mod zones;

@@ -1,17 +1,64 @@
-//! CPU copies of what the model reads: [`CloudTextureSet`].
+//! What the model reads, and CPU copies of that: [`CloudTextureSet`].
 
 use std::sync::Arc;
 
 use bevy::math::{DVec2, DVec3, DVec4};
 
-use super::{
-    field::{LayerSides, ModelTextures},
-    sampler::{Texture, sample_bytes},
-};
+use super::sampler::{Texture, sample_bytes};
 use crate::{
     settings::MAX_LAYERS,
     weather::{Swirl, WeatherPyramid},
 };
+
+/// Shares of the four octaves of a noise volume, as in the shader.
+pub(crate) const OCTAVES: [f32; 4] = [0.5, 0.25, 0.15, 0.1];
+
+/// Shares of the green, blue and alpha of a layer's shape noise, as in `layer.wesl`.
+pub const SHAPE_SHARES: [f32; 3] = [0.625, 0.25, 0.125];
+
+/// Shares of the red, green and blue of a layer's detail noise, as in `layer.wesl`.
+pub const DETAIL_SHARES: [f32; 3] = [0.5 / 0.875, 0.25 / 0.875, 0.125 / 0.875];
+
+/// What the model reads. `at` is in repeats of the texture, `level` the mip level; results are 0..=1.
+pub trait ModelTextures {
+    /// Sides of billow volume, wisp volume, coverage map and type map (texels).
+    fn sides(&self) -> [u32; 4];
+    /// Billowy noise: the volume's four octaves summed with their shares.
+    fn billow(&self, at: DVec3, level: f64) -> f64;
+    /// Wispy noise, likewise.
+    fn wisp(&self, at: DVec3, level: f64) -> f64;
+    /// Coverage map.
+    fn coverage(&self, at: DVec2, level: f64) -> f64;
+    /// Bound of the coverage map.
+    fn coverage_bound(&self, at: DVec2, level: f64) -> f64;
+    /// Type map.
+    fn type_map(&self, at: DVec2, level: f64) -> f64;
+    /// Vertical profile of a type at a height, both 0..=1.
+    fn gradient(&self, cloud_type: f64, height: f64) -> f64;
+    /// Sides of what weather-map layers read; `None` while it is not there, and then no layer is.
+    fn layer_sides(&self) -> Option<LayerSides>;
+    /// Layers' shape noise: red, and the sum of the others with their [shares](SHAPE_SHARES).
+    fn shape(&self, at: DVec3, level: f64) -> [f64; 2];
+    /// Layers' detail noise: red, green and blue summed with their [shares](DETAIL_SHARES).
+    fn detail(&self, at: DVec3, level: f64) -> f64;
+    /// Weather map of the layer at this place in [`CloudLayers`](crate::CloudLayers): coverage, height, base, and a bound of the coverage.
+    fn weather(&self, layer: usize, at: DVec2, level: f64) -> DVec4;
+    /// Curl field in x and y, fibres, cells.
+    fn swirl(&self, at: DVec2, level: f64) -> DVec4;
+}
+
+/// Sides of the textures that weather-map layers read (texels), and which layers have their map.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub struct LayerSides {
+    /// Shape volume.
+    pub shape: u32,
+    /// Detail volume.
+    pub detail: u32,
+    /// Weather maps.
+    pub weather: u32,
+    /// By the layer's place in [`CloudLayers`](crate::CloudLayers).
+    pub maps: [bool; MAX_LAYERS],
+}
 
 /// CPU copies of the textures that the built-in model reads, as the GPU has them. Cheap to clone.
 #[derive(Clone, Debug)]

@@ -10,10 +10,10 @@ use bevy::{
 
 use super::{CloudTextureSlot, texel::decoder};
 use crate::reference::{
-    field::{DETAIL_SHARES, OCTAVES, SHAPE_SHARES},
     keeper::CloudFieldError,
     query::{CloudTextureSet, LayerTextureSet},
     sampler::{Address, Texture},
+    texture_set::{DETAIL_SHARES, OCTAVES, SHAPE_SHARES},
 };
 
 /// What both worlds share.
