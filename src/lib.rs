@@ -26,6 +26,7 @@
 //! |---|---|
 //! | settings | [`CloudModel`], [`CloudLighting`], [`CloudQuality`], [`CloudTextures`], [`CloudClock`]; checks; presets |
 //! | textures | noise volumes, cloud maps, blue noise; slots for your own |
+//! | phases | phase functions that are tables: computed, or your own |
 //! | model | the shader module that says where cloud is; [`ModelShader`] replaces it |
 //! | render | the passes of each camera with a [`CloudView`] |
 //!
@@ -52,7 +53,7 @@ use bevy::{
     shader::ShaderLoader,
 };
 
-pub use model::ModelShader;
+pub use model::{ModelShader, ModelShaderError};
 pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
 pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
@@ -61,7 +62,8 @@ pub use reference::{
 pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
-    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, ModelPhases,
+    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, CloudWeather, CloudZone,
+    ModelPhases,
 };
 
 /// What most users need.
@@ -70,8 +72,8 @@ pub mod prelude {
         CloudBuffer, CloudDepth, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
             CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudMethod, CloudModel, CloudOrder,
-            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, Erosion,
-            Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
+            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView,
+            CloudWeather, CloudZone, Erosion, Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
         },
         weather::{WeatherMap, WeatherRecipe},
     };

@@ -4,6 +4,8 @@ use std::path::Path;
 
 use anyhow::{Context as _, Result, anyhow, bail};
 use bevy_cumulus::prelude::*;
+#[cfg(feature = "metar")]
+use bevy_cumulus::weather::metar::MetarSky;
 use clap::Args;
 
 use crate::common::{CameraPose, PLAIN, Scene, Setting, SunPose};
@@ -17,6 +19,15 @@ pub struct StartOptions {
     /// The sky: a built-in preset or a file
     #[arg(long, value_name = "NAME|FILE.ron")]
     pub preset: Option<String>,
+    /// The sky of an airport's report, such as "EGLL 231150Z 24012KT 9999 FEW022 BKN048 12/07 Q1013", in a preset's place
+    #[cfg(feature = "metar")]
+    #[arg(long, value_name = "REPORT", conflicts_with = "preset")]
+    pub metar: Option<String>,
+    /// Altitude of that airport (m)
+    #[cfg(feature = "metar")]
+    #[arg(long, value_name = "METRES", default_value_t = 0.0, allow_hyphen_values = true, requires = "metar",
+          value_parser = elevation)]
+    pub elevation: f32,
     /// What the sky may cost
     #[arg(long, value_parser = ["low", "medium", "high", "ultra", "reference"])]
     pub quality: Option<String>,
@@ -57,7 +68,14 @@ impl StartOptions {
         let named = self.scene.as_deref().map(find_scene).transpose()?;
         let scene = named.or_else(|| Scene::named(unnamed?)).unwrap_or(PLAIN);
         let preset_name = self.preset.as_deref().unwrap_or(scene.preset);
-        let preset = find_preset(preset_name)?;
+        #[cfg(feature = "metar")]
+        let (preset_name, reported) = match &self.metar {
+            Some(line) => ("metar", Some(MetarSky::parse(line, self.elevation).context("--metar")?.sky(LATITUDE, 0))),
+            None => (preset_name, None),
+        };
+        #[cfg(not(feature = "metar"))]
+        let reported = None;
+        let preset = reported.map_or_else(|| find_preset(preset_name), Ok)?;
         // A scene has its sun; else the preset's advice is taken.
         let advised = preset.sun_elevation.filter(|_| named.is_none() && (unnamed.is_none() || self.preset.is_some()));
         let elevation = advised.unwrap_or(scene.sun.elevation);
@@ -108,6 +126,16 @@ impl StartOptions {
         settings.validate().context("--set")?;
         Ok(settings)
     }
+}
+
+/// Of airports in temperate regions (degrees north).
+#[cfg(feature = "metar")]
+const LATITUDE: f32 = 50.0;
+
+#[cfg(feature = "metar")]
+fn elevation(text: &str) -> Result<f32, String> {
+    let number = text.trim().parse().ok().filter(|metres| (-430.0..=6000.0).contains(metres));
+    number.ok_or_else(|| "expected metres from -430 to 6000".to_owned())
 }
 
 fn find_scene(name: &str) -> Result<Scene> {

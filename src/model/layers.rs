@@ -18,6 +18,9 @@ pub(crate) const MAX_ZONES: usize = 8;
 pub(crate) const WAVES: [DVec2; 3] =
     [DVec2::new(2.4049, 0.8341), DVec2::new(-1.1823, 1.7329), DVec2::new(0.3719, -2.1317)];
 
+/// Direction in which clouds are renewed: along none of the waves, nor across.
+const RENEWS: DVec2 = DVec2::new(0.8, 0.6);
+
 /// Fine fibres of a sheet repeat this much sooner than the coarse, as in `layer.wesl`.
 pub(crate) const FINER: f32 = 3.137;
 
@@ -118,7 +121,8 @@ impl LayerUniform {
         let swirl = plane(layer.turbulence_scale, at);
         let fibres = plane(layer.shape_scale, stretched(at) + DVec2::splat(rise));
         let finer = plane(layer.shape_scale / FINER, stretched(at) + DVec2::splat(rise));
-        let renewed = at - downwind * (f64::from(layer.renewal) * seconds);
+        // The same way whatever the wind: one that turns must not sweep what has passed over the map since time zero.
+        let renewed = at - RENEWS * (layer.renewal_drift + f64::from(layer.renewal) * seconds);
         let wave = |k: usize| (renewed.dot(WAVES[k]) / scale + place(k as u32) * TAU).rem_euclid(TAU) as f32;
         let own_phase = phases.iter().position(|phase| layer.own_phase && *phase == layer.phase);
         let phase = own_phase.map_or(0, |slot| slot as u32 + 1);

@@ -10,10 +10,12 @@ use bevy::{
     },
 };
 
-use super::{ModelBindings, ModelSettings, ModelShader, ModelUniform, TangentFrame, TexelSizes};
+use super::{
+    MAX_ZONES, ModelBindings, ModelSettings, ModelShader, ModelUniform, TangentFrame, TexelSizes, ZoneAt, ZoneUniform,
+};
 use crate::{
     reference::planet::PLANET_RADIUS,
-    settings::{CloudClock, CloudLayers, CloudModel, Validate},
+    settings::{CloudClock, CloudLayers, CloudModel, CloudZone, Validate},
     textures::CloudTextureViews,
 };
 
@@ -31,12 +33,23 @@ impl ModelShader {
         let clock = app.world().get_resource::<CloudClock>().ok_or("no CloudClock")?;
         let world = app.get_sub_app(RenderApp).ok_or("no render app")?.world();
         let views = world.get_resource::<CloudTextureViews>().ok_or("no textures on this device")?;
+        if views.maps_pending {
+            return Err("a layer's map is not there yet".to_owned());
+        }
         let sizes = TexelSizes::of(views).ok_or("the textures are not there yet")?;
         let centre = DVec3::new(0.0, -PLANET_RADIUS, 0.0);
         let frame = TangentFrame::below(camera + model.world_offset, centre, PLANET_RADIUS)
             .ok_or("the camera is at the planet's centre, or not a number")?;
         let layers = app.world().get_resource::<CloudLayers>().ok_or("no CloudLayers")?;
-        let settings = ModelSettings { model, layers, zones: &[] };
+        let position = camera + model.world_offset;
+        let zones: Vec<ZoneUniform> =
+            app.world().try_query::<(Entity, &CloudZone, &GlobalTransform)>().map_or_else(Vec::new, |mut zones| {
+                let at = zones
+                    .iter(app.world())
+                    .filter_map(|(entity, zone, at)| ZoneAt::new(entity, zone, at.translation(), model.world_offset));
+                at.map(|zone| zone.seen_from(position, &frame).1).take(MAX_ZONES).collect()
+            });
+        let settings = ModelSettings { model, layers, zones: &zones };
         let device = world.resource::<RenderDevice>();
         let mut uniform = UniformBuffer::from(ModelUniform::new(&settings, clock.seconds, &frame, sizes));
         uniform.write_buffer(device, world.resource::<RenderQueue>());

@@ -142,8 +142,8 @@ impl ModelUniform {
 
     fn of_profile(model: &CloudModel, seconds: f64, frame: &TangentFrame, sizes: TexelSizes) -> Self {
         let wind = DVec2::new(model.wind.x.into(), model.wind.z.into());
-        let rise = f64::from(model.wind.y + model.evolution) * seconds;
-        let map = frame.map - wind * seconds;
+        let rise = model.drift.y + f64::from(model.wind.y + model.evolution) * seconds;
+        let map = frame.map - DVec2::new(model.drift.x, model.drift.z) - wind * seconds;
         let turned = DVec2::new(0.8 * map.x - 0.6 * map.y, 0.6 * map.x + 0.8 * map.y);
         let group_scale = f64::from(model.map_scale) * GROUP_SCALE;
         let own = wrapped(map, model.map_scale.into());

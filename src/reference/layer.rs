@@ -41,11 +41,10 @@ impl<T: ModelTextures> Layer<'_, T> {
         (cloud * (1.0 + RAIN_THICKENS * rain)).max(rain * f64::from(layer.rain_extinction))
     }
 
-    /// Most cloud where there is no more coverage than this, the anvil's share of it included.
+    /// Most cloud where there is no more coverage than this.
     fn cloud_bound(&self, coverage: f64) -> f64 {
         let layer = self.layer;
-        let most = coverage.powf(1.0 - 0.7 * f64::from(layer.anvil));
-        (most * f64::from(layer.profile_strength) * f64::from(layer.shape_gain)).clamp(0.0, 1.0)
+        (coverage * f64::from(layer.profile_strength) * f64::from(layer.shape_gain)).clamp(0.0, 1.0)
             * f64::from(layer.density)
     }
 
@@ -96,8 +95,12 @@ impl<T: ModelTextures> Layer<'_, T> {
         if x >= 1.0 {
             return Medium::EMPTY;
         }
-        let coverage = w.x.powf(1.0 - 0.7 * f64::from(layer.anvil) * smoothstep(0.5, 0.9, x));
-        let signal = height_signal(x, layer.peak_height.into());
+        // Below its anvil a cloud keeps to where coverage is high.
+        let anvil = f64::from(layer.anvil);
+        let narrow = anvil * mix(0.55, 0.0, smoothstep(0.6, 0.8, x));
+        let coverage = ((w.x - narrow) / (1.0 - narrow)).clamp(0.0, 1.0);
+        let spread = anvil * smoothstep(0.68, 0.76, x) * (1.0 - smoothstep(0.9, 1.0, x));
+        let signal = height_signal(x, layer.peak_height.into()).max(spread);
         let profile = (coverage * signal * f64::from(layer.profile_strength)).clamp(0.0, 1.0);
         let density = self.cloud_density(m, h, x, profile, lod) * f64::from(layer.density);
         if density <= 0.0 {
@@ -238,7 +241,10 @@ impl<T: ModelTextures> Layer<'_, T> {
         let s = self.stretched(m + self.turbulence(m, x, lod));
         let strength = f64::from(layer.shape_strength);
         if layer.kind == SHEET {
-            return eroded(profile, self.fibres(s, lod), strength);
+            let noise = self.fibres(s, lod);
+            // The remap leaves a core whole; filaments show in it too.
+            let filaments = mix(1.0, smoothstep(0.15, 0.85, noise), strength);
+            return eroded(profile, noise, strength) * filaments;
         }
         let q = DVec3::new(s.x, h, s.y);
         let gained = (profile * f64::from(layer.shape_gain)).clamp(0.0, 1.0);

@@ -8,7 +8,10 @@ use bevy::{
     render::{render_resource::*, renderer::RenderDevice},
 };
 
-use super::reproject::{HeldUniform, Pose, Sparse};
+use super::{
+    reproject::{HeldUniform, Pose, Sparse},
+    versions::Versions,
+};
 
 /// Where the coming frame stands in the window.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,8 +52,7 @@ pub(crate) struct HistoryKey {
     pub viewport: UVec4,
     pub window: u32,
     pub reset: u32,
-    pub settings: u64,
-    pub textures: u64,
+    pub versions: Versions,
     pub quality: crate::settings::CloudQuality,
     pub debug: crate::settings::CloudDebugView,
     pub atmosphere: bool,

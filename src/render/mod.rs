@@ -10,7 +10,9 @@ pub(crate) mod phase_slots;
 mod pipelines;
 mod reproject;
 mod status;
+mod versions;
 mod view;
+mod zones;
 
 use bevy::{
     asset::embedded_asset,
@@ -76,13 +78,14 @@ impl Plugin for CloudRenderPlugin {
 pub(crate) fn build_render(render_app: &mut SubApp) {
     render_app
         .init_resource::<view::ExtractedClouds>()
+        .init_resource::<zones::ExtractedZones>()
         .init_resource::<DrawFunctions<Transparent3d>>()
         .add_render_command::<Transparent3d, order::DrawClouds>()
         .init_gpu_resource::<ModelBindings>()
         .init_gpu_resource::<pipelines::CloudPipelines>()
         .init_gpu_resource::<phase_slots::PhaseTableBuffer>()
         .add_systems(RenderStartup, view::forget_lost_device)
-        .add_systems(ExtractSchedule, (view::extract_settings, view::extract_views))
+        .add_systems(ExtractSchedule, (view::extract_settings, view::extract_views, zones::extract_zones))
         .add_systems(
             Render,
             (

@@ -23,14 +23,16 @@ use super::{
     phase_slots::PhaseSlots,
     pipelines::DrawnInto,
     reproject::{HeldUniform, Pose},
+    versions::{Baked, Versions},
+    zones::{ExtractedZones, zones_around},
 };
 use crate::{
-    model::{ModelSettings, ModelUniform, TangentFrame, TexelSizes},
+    model::{MAX_ZONES, ModelSettings, ModelUniform, TangentFrame, TexelSizes, decks},
     phases::ReadyTables,
     reference::planet::PLANET_RADIUS,
     settings::{
         CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase, CloudQuality, CloudSettings,
-        CloudView, GoodPhases, GoodSettings, Validate,
+        CloudView, CloudWeather, GoodPhases, GoodSettings, Validate,
     },
     textures::CloudTextureViews,
 };
@@ -43,7 +45,11 @@ pub(crate) struct ExtractedClouds {
     phases: Vec<CloudPhase>,
     pub(super) tables: ReadyTables,
     /// Counts changes that make held frames wrong.
-    version: u64,
+    pub(super) version: u64,
+    /// Counts those by transitions, which the temporal filter follows and the path tracer does not.
+    pub(super) transitions: u64,
+    /// How fast a transition moves outlines (m/s).
+    outline_speed: f32,
 }
 
 /// A camera that shows clouds.
@@ -106,8 +112,20 @@ pub(crate) fn extract_settings(
     good: Extract<Res<GoodSettings>>,
     phases: Extract<Res<GoodPhases>>,
     tables: Extract<Res<ReadyTables>>,
+    weather: Extract<Option<Res<CloudWeather>>>,
     mut out: ResMut<ExtractedClouds>,
 ) {
+    let weather = weather.as_ref().filter(|weather| weather.has_moved());
+    out.outline_speed = weather.map_or(0.0, |weather| weather.outline_speed(good.0.clock.seconds) as f32);
+    if weather.is_some() {
+        // As when the sun moves, frames held are still of use.
+        out.settings.model.clone_from(&good.0.model);
+        out.settings.layers.clone_from(&good.0.layers);
+        out.settings.lighting.clone_from(&good.0.lighting);
+        out.phases.clone_from(&phases.0);
+        out.tables.clone_from(&tables);
+        out.transitions += 1;
+    }
     // Time and a shifted origin move what is seen; frames held are moved along.
     out.settings.clock.clone_from(&good.0.clock);
     out.settings.model.world_offset = good.0.model.world_offset;
@@ -224,13 +242,17 @@ pub(crate) fn prepare_views(
     lights: Query<&ExtractedDirectionalLight>,
     clouds: Res<ExtractedClouds>,
     textures: Res<CloudTextureViews>,
+    zones: Res<ExtractedZones>,
+    mut baked: Local<Baked>,
     status: Res<StatusFlags>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     mut warned: Local<bevy::platform::collections::HashSet<Entity>>,
+    mut crowded: Local<bool>,
 ) {
     let Some(sizes) = TexelSizes::of(&textures) else { return };
     let sun = brightest_sun(&lights);
+    baked.follow(textures.generation, clouds.outline_speed > 0.0);
     for mut item in &mut views {
         let viewport = item.drawn_viewport();
         if viewport.z == 0 || viewport.w == 0 {
@@ -247,7 +269,13 @@ pub(crate) fn prepare_views(
         }
         warned.remove(&item.entity);
         let Some(space) = space else { continue };
-        let (key, pose) = window_state(&item, &clouds, &textures, &space, sun);
+        let (key, pose) = window_state(
+            &item,
+            &clouds,
+            Versions::of(&clouds, &baked, &zones, item.cloud.is_path_traced()),
+            &space,
+            sun,
+        );
         let mut first = None;
         let history = match &mut item.history {
             Some(history) => {
@@ -268,12 +296,19 @@ pub(crate) fn prepare_views(
             exposure: item.camera.exposure,
             quality: &item.cloud.quality,
             lighting: &lighting,
+            highest_horizon: layers.highest_horizon(space.radius),
             phases: &phases,
             window,
             debug: item.cloud.debug,
         });
+        let reach = f64::from(item.cloud.quality.max_distance);
+        let (around, too_many) = zones_around(&zones.zones, pose.position, &space, reach);
+        if too_many && !*crowded {
+            *crowded = true;
+            warn!("clouds: camera {} has more than {MAX_ZONES} zones around it; the nearest count", item.entity);
+        }
         let model = ModelUniform::new(
-            &ModelSettings { model: &model, layers: &layers, zones: &[] },
+            &ModelSettings { model: &model, layers: &layers, zones: &around },
             clouds.settings.clock.seconds,
             &space,
             sizes,
@@ -334,7 +369,7 @@ fn space_below(
 fn window_state(
     item: &PreparedViewItem,
     clouds: &ExtractedClouds,
-    textures: &CloudTextureViews,
+    versions: Versions,
     space: &TangentFrame,
     sun: Sun,
 ) -> (HistoryKey, Pose) {
@@ -343,14 +378,18 @@ fn window_state(
     let model = &clouds.settings.model;
     let angle = texel_angle(view.clip_from_view, viewport, quality);
     let altitude = space.altitude as f32;
-    let to_shell = (model.bottom - altitude).max(altitude - model.top).max(300.0);
+    // To the nearest deck.
+    let to_shell = decks(model, clouds.settings.layers.shown().map(|(_, layer)| layer))
+        .into_iter()
+        .map(|deck| (deck.x - altitude).max(altitude - deck.y))
+        .fold(f32::INFINITY, f32::min)
+        .clamp(300.0, 1e7);
     let key = HistoryKey {
         size: marched_size(viewport, quality),
         viewport,
         window: quality.held_frames(),
         reset: item.cloud.reset,
-        settings: clouds.version,
-        textures: textures.generation,
+        versions,
         quality: quality.clone(),
         debug: item.cloud.debug,
         atmosphere: item.atmosphere.is_some(),
@@ -365,7 +404,7 @@ fn window_state(
         exposure: item.camera.exposure,
         seconds: clouds.settings.clock.seconds,
         wind: model.wind.with_y(0.0),
-        rise: model.wind.y.abs() + model.evolution.abs(),
+        rise: model.wind.y.abs() + model.evolution.abs() + clouds.outline_speed,
         to_shell,
         texel: angle * to_shell,
     };

@@ -10,9 +10,13 @@ mod phase;
 mod preset;
 mod quality;
 mod textures;
+mod transition;
 mod view;
+mod zone;
 
 use bevy::prelude::*;
+
+use crate::weather::{LclFormula, Steering, StormCell, WeatherRecipe};
 
 pub use check::{SettingsError, Validate};
 pub use debug::CloudDebugView;
@@ -26,7 +30,9 @@ pub use phase::{CloudPhase, ModelPhases, PhaseFunction};
 pub use preset::{CloudPreset, PresetError};
 pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
+pub use transition::CloudWeather;
 pub use view::{CloudClock, CloudOrder, CloudView};
+pub use zone::CloudZone;
 
 /// The last good value of each setting: what the renderer sees. A bad change is reported once and ignored.
 #[derive(Resource, Clone, Debug, Default)]
@@ -48,6 +54,7 @@ impl Plugin for CloudSettingsPlugin {
             .init_resource::<CloudTextures>()
             .init_resource::<CloudTextureSlots>()
             .init_resource::<CloudClock>()
+            .init_resource::<CloudWeather>()
             .init_resource::<GoodSettings>()
             .init_resource::<ModelPhases>()
             .init_resource::<GoodPhases>()
@@ -64,6 +71,12 @@ impl Plugin for CloudSettingsPlugin {
             .register_type::<CloudPreset>()
             .register_type::<CloudPhase>()
             .register_type::<ModelPhases>()
+            .register_type::<CloudWeather>()
+            .register_type::<CloudZone>()
+            .register_type::<WeatherRecipe>()
+            .register_type::<StormCell>()
+            .register_type::<Steering>()
+            .register_type::<LclFormula>()
             .init_asset::<CloudPreset>()
             .init_asset_loader::<preset::CloudPresetLoader>()
             .add_systems(
@@ -73,6 +86,7 @@ impl Plugin for CloudSettingsPlugin {
                     // As Bevy's own clock is: it rotates messages, and this system has none.
                     .ambiguous_with(bevy::ecs::message::message_update_system),
             )
+            .add_systems(Last, transition::change_weather.before(KeepGood))
             .add_systems(
                 Last,
                 (

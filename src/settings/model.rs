@@ -87,6 +87,9 @@ pub struct CloudModel {
     /// Rise of the noise through the clouds (m/s): shapes evolve instead of only sliding. Default 0.8.
     #[reflect(@-50.0..=50.0_f32)]
     pub evolution: f32,
+    /// Where the layer is at time zero (m, f64). Transitions keep a sky in place with it. Default 0.
+    #[reflect(@-1.0e12..=1.0e12_f32)]
+    pub drift: DVec3,
     /// Position of the world's origin on the planet's map (m, f64): change it when a floating origin shifts.
     /// Default 0.
     #[reflect(@-1.0e12..=1.0e12_f32)]
@@ -118,6 +121,7 @@ impl Default for CloudModel {
             wind: Vec3::new(8.0, 0.0, 3.0),
             wind_skew: 350.0,
             evolution: 0.8,
+            drift: DVec3::ZERO,
             world_offset: DVec3::ZERO,
         }
     }

@@ -21,7 +21,7 @@ use super::{
     recipe::Recipe,
     slots::{CloudTextureSlot, SlotStates, check_descriptor},
 };
-use crate::settings::{CloudTextures, GoodSettings, MAX_LAYERS};
+use crate::settings::{CloudTextures, CloudWeather, GoodSettings, MAX_LAYERS};
 
 /// Most work that baking does in one frame on a software rasteriser, in texel-octaves: one texel of one octave of 3D
 /// Worley noise, or what takes as long. Measured at 10 to 30 ms with Mesa's lavapipe on two cores.
@@ -61,6 +61,7 @@ impl Wanted {
 
 pub(super) fn extract(
     good: Extract<Res<GoodSettings>>,
+    weather: Extract<Option<Res<CloudWeather>>>,
     slots: Extract<Res<SlotStates>>,
     shared: Extract<Res<Progress>>,
     mut progress: ResMut<Progress>,
@@ -71,9 +72,11 @@ pub(super) fn extract(
         progress.0.enabled.store(true, Relaxed);
         progress.0.ask();
     }
+    // A sky that is to come has its volumes when it comes.
+    let is_ahead = weather.as_ref().is_some_and(|weather| weather.layers_ahead(good.0.clock.seconds).next().is_some());
     let now = Wanted {
         settings: Some(good.0.textures.clone()),
-        layers: good.0.layers.shown().next().is_some(),
+        layers: good.0.layers.shown().next().is_some() || is_ahead,
         images: slots.images(),
     };
     if *wanted != now {

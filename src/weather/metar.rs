@@ -3,6 +3,7 @@
 //! METAR is WMO code form FM 15 (WMO-No. 306, Manual on Codes, volume I.1). The crate `metar` parses the report; this module
 //! gives it what matters here, and turns the answer into plain data in metres, seconds and degrees.
 
+mod clouds;
 mod layers;
 mod report;
 mod sky;

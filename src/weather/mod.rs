@@ -4,6 +4,7 @@
 //! loaded becomes one with [`WeatherMap::from_image`]. [`Steering`] makes the numbers from the state of the air,
 //! [`orographic`] adds the cloud that hills make, and [`metar`] reads a sky from an airport's report.
 
+mod aloft;
 mod convert;
 mod edit;
 mod fields;
@@ -17,9 +18,11 @@ mod orographic;
 mod patterns;
 mod pyramid;
 mod recipe;
+mod sky;
 mod steering;
 mod swirl;
 
+pub use aloft::WindProfile;
 pub use convert::WeatherMapError;
 pub use edit::StormCell;
 pub use map::WeatherMap;

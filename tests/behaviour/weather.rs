@@ -7,6 +7,8 @@ mod maps;
 mod metar;
 #[cfg(feature = "metar")]
 mod program;
+#[cfg(feature = "metar")]
+mod sky;
 mod steering;
 
 use bevy_cumulus::prelude::*;
