@@ -11,8 +11,9 @@ use thiserror::Error;
 use super::{planet::Planet, query::CloudSky};
 use crate::{
     ModelShader,
+    model::ZoneAt,
     render::CloudStatus,
-    settings::{GoodSettings, KeepGood},
+    settings::{CloudZone, GoodSettings, KeepGood, Validate},
     textures::{CloudTextureSlot, CloudTextureStatus, cpu_copies::CpuCopies, readback, weather_maps},
 };
 
@@ -140,6 +141,7 @@ fn update_field(
     status: Option<Res<CloudStatus>>,
     shader: Option<Res<ModelShader>>,
     planets: Query<(&Atmosphere, &GlobalTransform)>,
+    zones: Query<(Entity, &CloudZone, &GlobalTransform)>,
     suns: Suns,
     mut custom: Local<bool>,
     mut field: ResMut<CloudField>,
@@ -184,7 +186,11 @@ fn update_field(
                 radius: atmosphere.inner_radius.into(),
             })
             .collect();
-        sky = sky.with_planets(&planets).with_sun(brightest(&suns)).at(good.clock.seconds);
+        // The renderer says what is wrong with one.
+        let valid = zones.iter().filter(|(_, zone, _)| zone.validate().is_ok());
+        let offset = good.model.world_offset;
+        let zones = valid.filter_map(|(entity, zone, at)| ZoneAt::new(entity, zone, at.translation(), offset));
+        sky = sky.with_zones(zones.collect()).with_planets(&planets).with_sun(brightest(&suns)).at(good.clock.seconds);
         Ok(sky)
     })();
 }

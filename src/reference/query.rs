@@ -12,7 +12,7 @@ use super::{
     quadrature::{self, Accuracy},
 };
 use crate::{
-    model::{ModelSettings, ZoneUniform},
+    model::{MAX_ZONES, ModelSettings, TangentFrame, ZoneAt, ZoneUniform},
     settings::{CloudLayers, CloudModel, SettingsError, Validate},
 };
 
@@ -23,7 +23,7 @@ pub const IN_CLOUD: f64 = 3.912e-3;
 /// Optical depth past which nothing passes: e⁻¹⁶ is 1e-7.
 const OPAQUE: f64 = 16.0;
 
-/// The sky as it is drawn, for the CPU to ask: settings, textures, planet, sun and cloud time.
+/// The sky as it is drawn, for the CPU to ask: settings, zones, textures, planet, sun and cloud time.
 ///
 /// Points are in the scene's world space (m), as `Vec3` or `DVec3`; [`CloudModel::world_offset`] and the planet of the
 /// scene's `Atmosphere` are reckoned with. Only cloud counts: no terrain, no clear air. Answers are those of the shader to
@@ -35,7 +35,7 @@ const OPAQUE: f64 = 16.0;
 pub struct CloudSky {
     model: Arc<CloudModel>,
     layers: Arc<CloudLayers>,
-    zones: Arc<[ZoneUniform]>,
+    zones: Arc<[ZoneAt]>,
     textures: CloudTextureSet,
     planets: Arc<[Planet]>,
     sun: Option<DVec3>,
@@ -77,6 +77,14 @@ impl CloudSky {
     pub fn with_layers(self, layers: CloudLayers) -> Result<Self, SettingsError> {
         layers.validate()?;
         Ok(Self { layers: Arc::new(layers), ..self })
+    }
+
+    /// The same sky with these zones.
+    pub(crate) fn with_zones(mut self, zones: Vec<ZoneAt>) -> Self {
+        if *zones != *self.zones {
+            self.zones = zones.into();
+        }
+        self
     }
 
     /// The same sky over these planets; a point belongs to the one whose centre is nearest. None is the default planet.
@@ -189,8 +197,21 @@ impl CloudSky {
         if !t.is_finite() {
             return None;
         }
-        let settings = ModelSettings { model: &self.model, layers: &self.layers, zones: &self.zones };
+        let zones = self.zones_around(eye + self.model.world_offset, planet)?;
+        let settings = ModelSettings { model: &self.model, layers: &self.layers, zones: &zones };
         LocalModel::of_settings(&settings, t, eye, planet, &self.textures)
+    }
+
+    /// The zones nearest to `eye` (offset included), as many as a view shows.
+    fn zones_around(&self, eye: DVec3, planet: Planet) -> Option<Vec<ZoneUniform>> {
+        if self.zones.is_empty() {
+            return Some(Vec::new());
+        }
+        let frame = TangentFrame::below(eye, planet.centre, planet.radius)?;
+        let mut near: Vec<(f64, ZoneUniform)> = self.zones.iter().map(|zone| zone.seen_from(eye, &frame)).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        near.truncate(MAX_ZONES);
+        Some(near.into_iter().map(|(_, zone)| zone).collect())
     }
 
     /// Optical depth from `a` towards `direction` over `length` metres, until it is `enough`.

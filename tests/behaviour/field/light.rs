@@ -8,6 +8,7 @@ use bevy_cumulus::{
         field::LocalModel,
         planet::{Planet, layer_intervals},
     },
+    settings::CloudZone,
 };
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
@@ -110,6 +111,11 @@ fn transmittance_through_layers_is_that_of_a_fine_march_on_the_gpu() {
         CloudLayer { extinction: 0.002, base: 2500.0, coverage: -0.3, far_coverage: 0.0, ..layers::sheet() },
     ]));
     app.insert_resource(CloudModel { coverage: 0.0, ..app.world().resource::<CloudModel>().clone() });
+    // One place is cleared, one is overcast.
+    for (x, strength) in [(-9000.0, -1.0), (9000.0, 0.7)] {
+        let zone = CloudZone { radius: 7000.0, edge: 3000.0, strength };
+        app.world_mut().spawn((zone, Transform::from_xyz(x, 0.0, 2000.0)));
+    }
     until_current(&mut app);
     let (all, worst, bias) = against_the_gpu(&mut app, 900.0, 32);
     assert!(spread(&all).iter().all(|n| *n > 5), "{:?}", spread(&all));
