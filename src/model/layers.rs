@@ -22,7 +22,7 @@ pub(crate) const WAVES: [DVec2; 3] =
 const RENEWS: DVec2 = DVec2::new(0.8, 0.6);
 
 /// Fine fibres of a sheet repeat this much sooner than the coarse, as in `layer.wesl`.
-const FINER: f32 = 3.137;
+pub(crate) const FINER: f32 = 3.137;
 
 /// Texels along one side of the textures that layers read.
 #[derive(Clone, Copy, Debug, PartialEq)]

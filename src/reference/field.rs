@@ -1,44 +1,27 @@
-//! The built-in model, "what is at p?". Twin of `model/model.wesl`, function for function.
+//! The built-in model, "what is at p?". Twin of `model/model.wesl` and `model/profile.wesl`, function for function;
+//! weather-map layers are in `layer.rs`.
 //!
 //! Offsets and rates are those that the shader is given (`model/uniform.rs`); positions are f64. What is read from
 //! textures comes through [`ModelTextures`]. A [`ModelShader`](crate::ModelShader) has no twin.
 
 use bevy::math::{DVec2, DVec3, DVec4, Vec4Swizzles};
 
+pub use super::texture_set::{DETAIL_SHARES, LayerSides, ModelTextures, SHAPE_SHARES};
 use super::{
-    planet::{Planet, altitude, map_position},
+    layer::Layer,
+    planet::{Interval, Planet, altitude, map_position},
     profile,
+    zones::{zones_at, zones_bound},
 };
 use crate::{
-    model::{ModelSettings, ModelUniform, TangentFrame, TexelSizes},
+    model::{LayerSizes, ModelSettings, ModelUniform, TangentFrame, TexelSizes, ZoneUniform},
     settings::{CloudLayers, CloudModel},
 };
-
-/// Shares of the four octaves of a noise volume, as in the shader.
-pub(crate) const OCTAVES: [f32; 4] = [0.5, 0.25, 0.15, 0.1];
-
-/// What the model reads. `at` is in repeats of the texture, `level` the mip level; results are 0..=1.
-pub trait ModelTextures {
-    /// Sides of billow volume, wisp volume, coverage map and type map (texels).
-    fn sides(&self) -> [u32; 4];
-    /// Billowy noise: the volume's four octaves summed with their shares.
-    fn billow(&self, at: DVec3, level: f64) -> f64;
-    /// Wispy noise, likewise.
-    fn wisp(&self, at: DVec3, level: f64) -> f64;
-    /// Coverage map.
-    fn coverage(&self, at: DVec2, level: f64) -> f64;
-    /// Bound of the coverage map.
-    fn coverage_bound(&self, at: DVec2, level: f64) -> f64;
-    /// Type map.
-    fn type_map(&self, at: DVec2, level: f64) -> f64;
-    /// Vertical profile of a type at a height, both 0..=1.
-    fn gradient(&self, cloud_type: f64, height: f64) -> f64;
-}
 
 /// What is at a point: `Medium` of `medium.wesl`.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Medium {
-    /// Density, 0 to [`CloudModel::density`]; 0 means empty air.
+    /// Density, the sum of all layers', each up to its factor ([`CloudModel::density`]); 0 means empty air.
     pub density: f64,
     /// Extinction coefficient σt·ρ (1/m).
     pub extinction: f64,
@@ -46,13 +29,17 @@ pub struct Medium {
     pub albedo: DVec3,
     /// Dimensional profile: 0 at the cloud's envelope, 1 deep inside.
     pub profile: f64,
-    /// Height within the layer: 0 base, 1 top.
-    pub height: f64,
+    /// Way straight down and up to the ends of the [deck](LocalModel::decks) it lies in (m).
+    pub span: DVec2,
+    /// Shares of the four phase functions in what is scattered here: the light's own and up to three of layers. Their sum
+    /// is 1.
+    pub phase: DVec4,
 }
 
 impl Medium {
     /// Clear air.
-    pub const EMPTY: Self = Self { density: 0.0, extinction: 0.0, albedo: DVec3::ONE, profile: 0.0, height: 0.0 };
+    pub const EMPTY: Self =
+        Self { density: 0.0, extinction: 0.0, albedo: DVec3::ONE, profile: 0.0, span: DVec2::ZERO, phase: DVec4::X };
 }
 
 /// The model at one time, in the tangent frame below one point: what a camera at that point is shown.
@@ -69,12 +56,36 @@ pub struct LocalModel<'a, T> {
 impl<'a, T: ModelTextures> LocalModel<'a, T> {
     /// The model at cloud time `seconds` as seen from `eye` (world space, m). `None` where up is undefined: at the
     /// planet's centre, or where a number is not finite.
-    pub fn new(model: &CloudModel, seconds: f64, eye: DVec3, planet: Planet, textures: &'a T) -> Option<Self> {
-        let frame = TangentFrame::below(eye + model.world_offset, planet.centre, planet.radius)?;
+    pub fn new(
+        model: &CloudModel,
+        layers: &CloudLayers,
+        seconds: f64,
+        eye: DVec3,
+        planet: Planet,
+        textures: &'a T,
+    ) -> Option<Self> {
+        let settings = ModelSettings { model, layers, zones: &[] };
+        Self::of_settings(&settings, seconds, eye, planet, textures)
+    }
+
+    /// As [`new`](Self::new), with zones.
+    pub(crate) fn of_settings(
+        settings: &ModelSettings,
+        seconds: f64,
+        eye: DVec3,
+        planet: Planet,
+        textures: &'a T,
+    ) -> Option<Self> {
+        let frame = TangentFrame::below(eye + settings.model.world_offset, planet.centre, planet.radius)?;
         let [billow, wisp, coverage, type_map] = textures.sides();
-        let sizes = TexelSizes { billow, wisp, coverage, type_map, layers: None };
-        let settings = ModelSettings { model, layers: &CloudLayers::default(), zones: &[] };
-        Some(Self { model: ModelUniform::new(&settings, seconds, &frame, sizes), frame, eye, textures })
+        let layers = textures.layer_sides().map(|LayerSides { shape, detail, weather, maps }| LayerSizes {
+            shape,
+            detail,
+            weather,
+            maps,
+        });
+        let sizes = TexelSizes { billow, wisp, coverage, type_map, layers };
+        Some(Self { model: ModelUniform::new(settings, seconds, &frame, sizes), frame, eye, textures })
     }
 
     /// A point of the world (m) in the frame.
@@ -97,22 +108,94 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         self.frame.altitude
     }
 
-    /// Lowest and highest altitude that may hold cloud (m).
+    /// Lowest and highest altitude that may hold cloud (m); the first is the larger where there is none at all.
     pub fn bounds(&self) -> [f64; 2] {
-        [self.model.bottom.into(), self.model.top.into()]
+        [self.model.bounds.x.into(), self.model.bounds.y.into()]
     }
 
-    /// The finest detail there is to see (m): a texel of the finest noise, and no more than 1/64 of the layer.
+    /// Altitudes that may hold cloud (m): ranges with empty air between them, lowest first.
+    pub fn decks(&self) -> impl Iterator<Item = Interval> + '_ {
+        let halves = self.model.decks.iter().flat_map(|pair| [pair.xy(), pair.zw()]);
+        halves.take(self.model.counts.z as usize).map(|deck| deck.to_array().map(f64::from))
+    }
+
+    /// The finest detail there is to see (m): a texel of the finest noise, and no more than 1/64 of any layer.
     pub fn finest(&self) -> f64 {
         let texels = self.model.texels;
         let detail = if self.model.detail_strength > 0.0 { texels.y } else { texels.x };
-        f64::from(texels.x.min(detail).min(texels.z).exp2()).min(self.thickness() / 64.0)
+        let own = f64::from(texels.x.min(detail).min(texels.z).exp2()).min(self.thickness() / 64.0);
+        let own = if self.has_profile() { own } else { f64::INFINITY };
+        self.layers().map(|layer| layer.finest()).fold(own, f64::min)
     }
 
-    /// Upper bound of the density within `reach` metres of `p`; its extinction is that times σt.
+    /// Upper bound of the density within `reach` metres of `p`.
     pub fn density_bound(&self, p: DVec3, reach: f64) -> f64 {
+        let h = altitude(p, self.frame.radius);
+        let own = if self.has_profile() { self.profile_bound(p, h, reach) } else { 0.0 };
+        own + self.layers().map(|layer| layer.density_bound(p, h, reach)).sum::<f64>()
+    }
+
+    /// As [`density_bound`](Self::density_bound), of the extinction (1/m).
+    pub fn extinction_bound(&self, p: DVec3, reach: f64) -> f64 {
+        let h = altitude(p, self.frame.radius);
+        let own = if self.has_profile() { self.profile_bound(p, h, reach) } else { 0.0 };
+        own * f64::from(self.model.extinction)
+            + self.layers().map(|layer| layer.extinction_bound(p, h, reach)).sum::<f64>()
+    }
+
+    /// The medium at `p`, filtered over 2^`lod` metres.
+    pub fn sample_medium(&self, p: DVec3, lod: f64) -> Medium {
+        let h = altitude(p, self.frame.radius);
+        let mut sum = if self.has_profile() { self.sample_profile(p, h, lod) } else { Medium::EMPTY };
+        for layer in self.layers() {
+            if h <= f64::from(layer.layer.bottom) || h >= f64::from(layer.layer.top) {
+                continue;
+            }
+            let one = layer.sample(p, h, lod);
+            if one.extinction <= 0.0 {
+                continue;
+            }
+            // Extinctions add up; what is scattered is each one's share of it.
+            let both = sum.extinction + one.extinction;
+            let share = one.extinction / both;
+            sum.albedo = sum.albedo.lerp(one.albedo, share);
+            sum.phase = sum.phase.lerp(one.phase, share);
+            sum.density += one.density;
+            sum.profile = sum.profile.max(one.profile);
+            sum.extinction = both;
+        }
+        sum.span = self.deck_around(h);
+        sum
+    }
+
+    /// Way down and up to the ends of the deck that holds this altitude (m).
+    fn deck_around(&self, h: f64) -> DVec2 {
+        let deck = self.decks().find(|[_, top]| h <= *top);
+        deck.map_or(DVec2::ZERO, |[bottom, top]| DVec2::new(h - bottom, top - h).max(DVec2::ZERO))
+    }
+
+    fn has_profile(&self) -> bool {
+        self.model.counts.x != 0
+    }
+
+    fn layers(&self) -> impl Iterator<Item = Layer<'_, T>> {
+        let layers = &self.model.layers[..self.model.counts.y as usize];
+        layers.iter().map(|layer| Layer {
+            layer,
+            zones: self.zones(),
+            radius: self.frame.radius,
+            textures: self.textures,
+        })
+    }
+
+    fn zones(&self) -> &[ZoneUniform] {
+        &self.model.zones[..self.model.counts.w as usize]
+    }
+
+    /// As [`density_bound`](Self::density_bound), of the thesis's layer; `h` is the altitude of `p`.
+    fn profile_bound(&self, p: DVec3, h: f64, reach: f64) -> f64 {
         let model = &self.model;
-        let height = self.layer_height(p);
+        let height = self.layer_height(h);
         let away = reach / self.thickness();
         if height + away < 0.0 || height - away > 1.0 {
             return 0.0;
@@ -127,19 +210,13 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
             own = own.max(self.textures.coverage(self.own_map(m), MEAN_LEVEL));
             group = group.max(self.textures.coverage(self.group_map(m), MEAN_LEVEL));
         }
-        self.combine_coverage(own, group) * f64::from(model.density)
+        let zones = zones_bound(self.zones(), m, wide.exp2());
+        self.combine_coverage(own, group, zones) * f64::from(model.density)
     }
 
-    /// As [`density_bound`](Self::density_bound), of the extinction (1/m).
-    pub fn extinction_bound(&self, p: DVec3, reach: f64) -> f64 {
-        self.density_bound(p, reach) * f64::from(self.model.extinction)
-    }
-
-    /// The medium at `p`, filtered over 2^`lod` metres.
-    pub fn sample_medium(&self, p: DVec3, lod: f64) -> Medium {
+    fn sample_profile(&self, p: DVec3, h: f64, lod: f64) -> Medium {
         let model = &self.model;
-        let h = altitude(p, self.frame.radius);
-        let height = (h - f64::from(model.bottom)) / self.thickness();
+        let height = self.layer_height(h);
         let m = self.leaning_position(p, height);
         let profile = self.dimensional_profile(m, height, lod);
         if profile <= 0.0 {
@@ -151,7 +228,7 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
             extinction: density * f64::from(model.extinction),
             albedo: model.albedo.xyz().as_dvec3(),
             profile,
-            height,
+            ..Medium::EMPTY
         }
     }
 
@@ -159,8 +236,8 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         f64::from(self.model.top) - f64::from(self.model.bottom)
     }
 
-    fn layer_height(&self, p: DVec3) -> f64 {
-        (altitude(p, self.frame.radius) - f64::from(self.model.bottom)) / self.thickness()
+    fn layer_height(&self, h: f64) -> f64 {
+        (h - f64::from(self.model.bottom)) / self.thickness()
     }
 
     /// Map position with the lean of tops taken out (m).
@@ -178,9 +255,9 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
     }
 
     /// Coverage from the two readings of the map.
-    fn combine_coverage(&self, own: f64, group: f64) -> f64 {
+    fn combine_coverage(&self, own: f64, group: f64, zones: f64) -> f64 {
         let gathered = own * mix(1.0, smoothstep(0.0, 0.5, group), self.model.map_variation.into());
-        (gathered + f64::from(self.model.coverage)).clamp(0.0, 1.0)
+        (gathered + f64::from(self.model.coverage) + zones).clamp(0.0, 1.0)
     }
 
     fn coverage_at(&self, m: DVec2, lod: f64) -> f64 {
@@ -193,7 +270,7 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         let model = &self.model;
         let own = read(self.own_map(m), model.map_rate, model.texels.w);
         let group = read(self.group_map(m), model.group_rate, model.map_texels.x);
-        self.combine_coverage(own, group)
+        self.combine_coverage(own, group, zones_at(self.zones(), m))
     }
 
     /// 0 stratus to 1 cumulus.
@@ -247,19 +324,19 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
 }
 
 /// Past every map's last mip level, which holds its mean; and where coverage fades to that (m).
-const MEAN_LEVEL: f64 = 16.0;
-const FADE: [f64; 2] = [1e6, 4e6];
+pub(super) const MEAN_LEVEL: f64 = 16.0;
+pub(super) const FADE: [f64; 2] = [1e6, 4e6];
 
 /// Mip level for a filter width, given log2 of a texel's size.
-fn level(lod: f64, texel: f32) -> f64 {
+pub(super) fn level(lod: f64, texel: f32) -> f64 {
     (lod - f64::from(texel)).max(0.0)
 }
 
-fn mix(a: f64, b: f64, share: f64) -> f64 {
+pub(super) fn mix(a: f64, b: f64, share: f64) -> f64 {
     a * (1.0 - share) + b * share
 }
 
-fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
+pub(super) fn smoothstep(low: f64, high: f64, x: f64) -> f64 {
     let t = ((x - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }

@@ -11,9 +11,10 @@ use thiserror::Error;
 use super::{planet::Planet, query::CloudSky};
 use crate::{
     ModelShader,
+    model::ZoneAt,
     render::CloudStatus,
-    settings::{GoodSettings, KeepGood},
-    textures::{CloudTextureSlot, CloudTextureStatus, cpu_copies::CpuCopies, readback},
+    settings::{CloudZone, GoodSettings, KeepGood, Validate},
+    textures::{CloudTextureSlot, CloudTextureStatus, cpu_copies::CpuCopies, readback, weather_maps},
 };
 
 /// Lets the CPU ask about the clouds: adds [`CloudField`] and keeps it as what is drawn. Add it with
@@ -22,14 +23,15 @@ use crate::{
 /// Costs, none of them without this plugin: the textures are read back once after each bake or change, a megabyte a
 /// frame and without waiting for the GPU, some 80 frames for all at the default sizes; otherwise next to nothing. They
 /// take 36 MB of memory at the default sizes: 9.6 MB a volume of 128³, 5.6 MB each for coverage, its bound and the type
-/// map at 1024², as f32.
+/// map at 1024², as f32. With weather-map layers 20 MB more for their volumes; their maps are shared with the renderer.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct CloudFieldPlugin;
 
 /// The sky for the CPU to ask, in Bevy's main world: see [`CloudSky`]. Added by [`CloudFieldPlugin`].
 ///
 /// It follows settings, clock, sun, planet and textures at the end of each frame: in `Update` it is the sky of the last
-/// frame. A changed texture shows here some frames after it shows on screen; see [`is_current`](Self::is_current).
+/// frame. A changed texture, and a first layer, shows here some frames after it shows on screen; see
+/// [`is_current`](Self::is_current). An app that starts with layers has no sky before it has theirs.
 ///
 /// ```no_run
 /// # use bevy::prelude::*;
@@ -50,7 +52,7 @@ pub struct CloudField {
 /// Why nothing can be said about the clouds.
 #[derive(Error, Clone, PartialEq, Debug)]
 pub enum CloudFieldError {
-    /// The textures are still being baked or read back. Wait.
+    /// The textures are still being baked or read back, or layers' first maps are being made. Wait.
     #[error("the cloud textures are not on the CPU yet")]
     NotReady,
     /// A [`ModelShader`] is in the built-in model's place, and the CPU cannot run it.
@@ -103,7 +105,10 @@ impl Plugin for CloudFieldPlugin {
             .insert_resource(CloudField { sky: Err(CloudFieldError::NotReady), current: false })
             .add_systems(
                 Last,
-                (read_images.run_if(resource_exists::<Assets<Image>>), update_field).chain().after(KeepGood),
+                (read_images.run_if(resource_exists::<Assets<Image>>), update_field)
+                    .chain()
+                    .after(KeepGood)
+                    .after(weather_maps::follow_layers),
             );
     }
 
@@ -132,10 +137,11 @@ type Suns<'w, 's> = Query<'w, 's, (&'static DirectionalLight, &'static GlobalTra
 fn update_field(
     copies: Res<CpuCopies>,
     good: Option<Res<GoodSettings>>,
-    textures: Option<Res<CloudTextureStatus>>,
+    (textures, maps): (Option<Res<CloudTextureStatus>>, Option<Res<weather_maps::LayerMaps>>),
     status: Option<Res<CloudStatus>>,
     shader: Option<Res<ModelShader>>,
     planets: Query<(&Atmosphere, &GlobalTransform)>,
+    zones: Query<(Entity, &CloudZone, &GlobalTransform)>,
     suns: Suns,
     mut custom: Local<bool>,
     mut field: ResMut<CloudField>,
@@ -143,7 +149,12 @@ fn update_field(
     // Once replaced, the built-in model does not come back.
     *custom |= shader.is_some();
     let baking = textures.is_none_or(|textures| textures.baking);
-    field.current = !baking && copies.are_current();
+    let has_layers = good.as_ref().is_some_and(|good| good.0.layers.shown().next().is_some());
+    let maps = maps.as_ref().map(|maps| maps.published());
+    let awaits_maps = has_layers && maps.is_none_or(|maps| maps.pending);
+    let set = copies.get(has_layers);
+    let awaits_layers = has_layers && (awaits_maps || set.as_ref().is_ok_and(|set| set.layers.is_none()));
+    field.current = !baking && !awaits_layers && copies.are_current();
     field.sky = (|| {
         if *custom {
             return Err(CloudFieldError::CustomModel);
@@ -151,11 +162,22 @@ fn update_field(
         if let Some(reason) = status.as_ref().and_then(|status| status.unsupported()) {
             return Err(CloudFieldError::Unsupported { reason: reason.to_owned() });
         }
-        let set = copies.get()?;
+        let mut set = set?;
         let good = &good.as_ref().ok_or(CloudFieldError::NotReady)?.0;
+        if let Some(maps) = maps {
+            set = set.with_maps(&maps.maps);
+        }
+        // A sky that is there stays, and layers appear in it as they do on screen.
+        if field.sky.is_err() && awaits_layers {
+            return Err(CloudFieldError::NotReady);
+        }
         let mut sky = match &field.sky {
-            Ok(sky) if sky.textures().is(&set) && *sky.model() == good.model => sky.clone(),
-            _ => CloudSky::new(good.model.clone(), set).map_err(|_| CloudFieldError::NotReady)?,
+            Ok(sky) if sky.textures().is(&set) && *sky.model() == good.model && *sky.layers() == good.layers => {
+                sky.clone()
+            }
+            _ => CloudSky::new(good.model.clone(), set)
+                .and_then(|sky| sky.with_layers(good.layers.clone()))
+                .map_err(|_| CloudFieldError::NotReady)?,
         };
         let planets: Vec<Planet> = planets
             .iter()
@@ -164,7 +186,11 @@ fn update_field(
                 radius: atmosphere.inner_radius.into(),
             })
             .collect();
-        sky = sky.with_planets(&planets).with_sun(brightest(&suns)).at(good.clock.seconds);
+        // The renderer says what is wrong with one.
+        let valid = zones.iter().filter(|(_, zone, _)| zone.validate().is_ok());
+        let offset = good.model.world_offset;
+        let zones = valid.filter_map(|(entity, zone, at)| ZoneAt::new(entity, zone, at.translation(), offset));
+        sky = sky.with_zones(zones.collect()).with_planets(&planets).with_sun(brightest(&suns)).at(good.clock.seconds);
         Ok(sky)
     })();
 }

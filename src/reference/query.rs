@@ -2,16 +2,19 @@
 
 use std::sync::Arc;
 
-use bevy::math::{DVec2, DVec3};
+use bevy::math::DVec3;
 
+pub use super::texture_set::{CloudTextureSet, LayerTextureSet};
 use super::{
-    field::{LocalModel, Medium, ModelTextures},
+    field::{LocalModel, Medium},
     integrate,
-    planet::{Planet, ground_distance, layer_intervals},
+    planet::{Interval, Planet, ground_distance, layer_intervals},
     quadrature::{self, Accuracy},
-    sampler::Texture,
 };
-use crate::settings::{CloudModel, SettingsError, Validate};
+use crate::{
+    model::{MAX_ZONES, ModelSettings, TangentFrame, ZoneAt, ZoneUniform},
+    settings::{CloudLayers, CloudModel, SettingsError, Validate},
+};
 
 /// Extinction (1/m) from which on a point counts as in cloud: one can see less than a kilometre (Koschmieder's
 /// 3.912/V), where the World Meteorological Organization draws the line between mist and fog.
@@ -20,64 +23,7 @@ pub const IN_CLOUD: f64 = 3.912e-3;
 /// Optical depth past which nothing passes: e⁻¹⁶ is 1e-7.
 const OPAQUE: f64 = 16.0;
 
-/// CPU copies of the textures that the built-in model reads, as the GPU has them. Cheap to clone.
-#[derive(Clone, Debug)]
-pub struct CloudTextureSet {
-    /// Billowy noise: the four channels summed with their shares.
-    pub billow: Arc<Texture>,
-    /// Wispy noise, likewise.
-    pub wisp: Arc<Texture>,
-    /// Coverage map.
-    pub coverage: Arc<Texture>,
-    /// Bound of the coverage map.
-    pub coverage_bound: Arc<Texture>,
-    /// Type map.
-    pub type_map: Arc<Texture>,
-    /// Vertical profile: x the type, y the height.
-    pub gradient: Arc<Texture>,
-}
-
-impl CloudTextureSet {
-    /// Memory that they take (bytes).
-    pub fn bytes(&self) -> usize {
-        self.all().map(|texture| texture.bytes()).iter().sum()
-    }
-
-    /// Whether both are clones of one.
-    pub(crate) fn is(&self, other: &Self) -> bool {
-        self.all().iter().zip(other.all()).all(|(mine, other)| Arc::ptr_eq(mine, other))
-    }
-
-    fn all(&self) -> [&Arc<Texture>; 6] {
-        [&self.billow, &self.wisp, &self.coverage, &self.coverage_bound, &self.type_map, &self.gradient]
-    }
-}
-
-impl ModelTextures for CloudTextureSet {
-    fn sides(&self) -> [u32; 4] {
-        [&self.billow, &self.wisp, &self.coverage, &self.type_map].map(|texture| texture.size().x)
-    }
-    fn billow(&self, at: DVec3, level: f64) -> f64 {
-        self.billow.sample(at, level)
-    }
-    fn wisp(&self, at: DVec3, level: f64) -> f64 {
-        self.wisp.sample(at, level)
-    }
-    fn coverage(&self, at: DVec2, level: f64) -> f64 {
-        self.coverage.sample(at.extend(0.0), level)
-    }
-    fn coverage_bound(&self, at: DVec2, level: f64) -> f64 {
-        self.coverage_bound.sample(at.extend(0.0), level)
-    }
-    fn type_map(&self, at: DVec2, level: f64) -> f64 {
-        self.type_map.sample(at.extend(0.0), level)
-    }
-    fn gradient(&self, cloud_type: f64, height: f64) -> f64 {
-        self.gradient.sample(DVec3::new(cloud_type, height, 0.0), 0.0)
-    }
-}
-
-/// The sky as it is drawn, for the CPU to ask: settings, textures, planet, sun and cloud time.
+/// The sky as it is drawn, for the CPU to ask: settings, zones, textures, planet, sun and cloud time.
 ///
 /// Points are in the scene's world space (m), as `Vec3` or `DVec3`; [`CloudModel::world_offset`] and the planet of the
 /// scene's `Atmosphere` are reckoned with. Only cloud counts: no terrain, no clear air. Answers are those of the shader to
@@ -88,6 +34,8 @@ impl ModelTextures for CloudTextureSet {
 #[derive(Clone, Debug)]
 pub struct CloudSky {
     model: Arc<CloudModel>,
+    layers: Arc<CloudLayers>,
+    zones: Arc<[ZoneAt]>,
     textures: CloudTextureSet,
     planets: Arc<[Planet]>,
     sun: Option<DVec3>,
@@ -95,14 +43,22 @@ pub struct CloudSky {
 }
 
 impl CloudSky {
-    /// The sky of these settings and textures at cloud time 0, on the default planet, without a sun.
+    /// The sky of these settings and textures at cloud time 0, on the default planet, without a sun and weather-map layers.
     ///
     /// # Errors
     /// Where a setting is out of its range.
     pub fn new(model: CloudModel, textures: CloudTextureSet) -> Result<Self, SettingsError> {
         model.validate()?;
         let planets = Arc::from([Planet::default()]);
-        Ok(Self { model: Arc::new(model), textures, planets, sun: None, seconds: 0.0 })
+        Ok(Self {
+            model: Arc::new(model),
+            layers: Arc::default(),
+            zones: Arc::from([]),
+            textures,
+            planets,
+            sun: None,
+            seconds: 0.0,
+        })
     }
 
     /// The same sky with other settings.
@@ -112,6 +68,23 @@ impl CloudSky {
     pub fn with_model(self, model: CloudModel) -> Result<Self, SettingsError> {
         model.validate()?;
         Ok(Self { model: Arc::new(model), ..self })
+    }
+
+    /// The same sky with these weather-map layers; those whose map is not among its textures are not there.
+    ///
+    /// # Errors
+    /// Where a setting is out of its range.
+    pub fn with_layers(self, layers: CloudLayers) -> Result<Self, SettingsError> {
+        layers.validate()?;
+        Ok(Self { layers: Arc::new(layers), ..self })
+    }
+
+    /// The same sky with these zones.
+    pub(crate) fn with_zones(mut self, zones: Vec<ZoneAt>) -> Self {
+        if *zones != *self.zones {
+            self.zones = zones.into();
+        }
+        self
     }
 
     /// The same sky over these planets; a point belongs to the one whose centre is nearest. None is the default planet.
@@ -142,9 +115,14 @@ impl CloudSky {
         self.seconds
     }
 
-    /// The settings.
+    /// The settings of the thesis's layer.
     pub fn model(&self) -> &CloudModel {
         &self.model
+    }
+
+    /// The weather-map layers.
+    pub fn layers(&self) -> &CloudLayers {
+        &self.layers
     }
 
     /// The textures.
@@ -157,12 +135,13 @@ impl CloudSky {
         self.sun
     }
 
-    /// Density at `p` at cloud time `t` (s): 0 in clear air, up to [`CloudModel::density`]. About 1 µs.
+    /// Density at `p` at cloud time `t` (s), the sum of all layers', rain included: 0 in clear air. About 1 µs, and as much
+    /// again for each weather-map layer that reaches this altitude.
     pub fn density(&self, p: impl Into<DVec3>, t: f64) -> f64 {
         self.medium(p, t).density
     }
 
-    /// All that the model says of `p` at cloud time `t` (s): density, extinction, height in the layer.
+    /// All that the model says of `p` at cloud time `t` (s): density, extinction, albedo, phase functions.
     pub fn medium(&self, p: impl Into<DVec3>, t: f64) -> Medium {
         let p = p.into();
         self.seen_from(p, t).map_or(Medium::EMPTY, |model| model.sample_medium(model.local(p), 0.0))
@@ -218,7 +197,21 @@ impl CloudSky {
         if !t.is_finite() {
             return None;
         }
-        LocalModel::new(&self.model, t, eye, planet, &self.textures)
+        let zones = self.zones_around(eye + self.model.world_offset, planet)?;
+        let settings = ModelSettings { model: &self.model, layers: &self.layers, zones: &zones };
+        LocalModel::of_settings(&settings, t, eye, planet, &self.textures)
+    }
+
+    /// The zones nearest to `eye` (offset included), as many as a view shows.
+    fn zones_around(&self, eye: DVec3, planet: Planet) -> Option<Vec<ZoneUniform>> {
+        if self.zones.is_empty() {
+            return Some(Vec::new());
+        }
+        let frame = TangentFrame::below(eye, planet.centre, planet.radius)?;
+        let mut near: Vec<(f64, ZoneUniform)> = self.zones.iter().map(|zone| zone.seen_from(eye, &frame)).collect();
+        near.sort_by(|a, b| a.0.total_cmp(&b.0));
+        near.truncate(MAX_ZONES);
+        Some(near.into_iter().map(|(_, zone)| zone).collect())
     }
 
     /// Optical depth from `a` towards `direction` over `length` metres, until it is `enough`.
@@ -232,7 +225,10 @@ impl CloudSky {
         // Five samples over four texels.
         let panel = (4.0 * model.finest()).clamp(4.0, 100.0);
         let mut depth = 0.0;
-        for interval in layer_intervals(eye.y, direction.y, model.bounds(), model.radius(), length) {
+        let through = |deck: Interval| layer_intervals(eye.y, direction.y, deck, model.radius(), length);
+        let mut intervals: Vec<Interval> = model.decks().flat_map(through).collect();
+        intervals.sort_by(|a, b| a[0].total_cmp(&b[0]));
+        for interval in intervals {
             let accuracy = Accuracy { panel, relative: 2e-3, shortest: 0.25, enough: enough - depth };
             depth += quadrature::integrate(extinction, bound, interval, accuracy);
             if depth > enough {
@@ -246,7 +242,7 @@ impl CloudSky {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::planet::PLANET_RADIUS;
+    use crate::reference::{planet::PLANET_RADIUS, sampler::Texture};
 
     /// Cloud of density 1 all through the layer.
     fn slab(gradient: Texture) -> CloudSky {
@@ -258,6 +254,7 @@ mod tests {
             coverage_bound: one.clone(),
             type_map: one,
             gradient: Arc::new(gradient),
+            layers: None,
         };
         let model = CloudModel {
             bottom: 1000.0,

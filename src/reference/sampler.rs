@@ -2,7 +2,7 @@
 //!
 //! GPUs give the weights 8 bits or so; their answer is that of a point within 1/256 of a texel.
 
-use bevy::math::{DVec3, UVec3};
+use bevy::math::{DVec2, DVec3, DVec4, UVec3};
 
 /// What lies beyond the edge.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -95,6 +95,22 @@ impl Level {
     }
 }
 
+/// A square of 2ⁿ texels a side of four bytes each, repeated, with all its mip levels: as [`Texture::sample`] does.
+pub(crate) fn sample_bytes(levels: &[Vec<[u8; 4]>], at: DVec2, level: f64) -> DVec4 {
+    let last = levels.len() - 1;
+    let level = level.clamp(0.0, last as f64);
+    let (fine, between) = (level.floor() as usize, level.fract());
+    let read = |i: usize| {
+        let (side, texels) = (1 << (last - i), &levels[i]);
+        let [x, y] = [at.x, at.y].map(|at| neighbours(at, side, Address::Repeat));
+        let texel = |x: usize, y: usize| DVec4::from_array(texels[y * side + x].map(f64::from));
+        let row = |y: usize| texel(x.0, y).lerp(texel(x.1, y), x.2);
+        row(y.0).lerp(row(y.1), y.2) / 255.0
+    };
+    let value = read(fine);
+    if between > 0.0 { value.lerp(read(fine + 1), between) } else { value }
+}
+
 /// The texels to either side and the weight of the second. Any number gives texels that are there.
 fn neighbours(at: f64, count: usize, address: Address) -> (usize, usize, f64) {
     let n = count as f64;
@@ -150,6 +166,32 @@ mod tests {
         assert!((t.sample(at, -3.0) - value).abs() < 1e-9);
         assert!((t.sample(at, 0.25) - (0.75 * value + 250.0)).abs() < 1e-9);
         assert_eq!([t.sample(at, 1.0), t.sample(at, 9.0)], [1000.0; 2]);
+    }
+
+    #[test]
+    fn bytes_are_read_as_textures_are() {
+        let byte = |i: usize, k: usize| (i * 37 + k * 91) as u8;
+        let levels: Vec<Vec<[u8; 4]>> =
+            [64, 16, 4, 1].map(|n| (0..n).map(|i| [0, 1, 2, 3].map(|k| byte(i + n, k))).collect()).to_vec();
+        let channel = |k: usize| {
+            let float = |level: &Vec<[u8; 4]>| {
+                let side = level.len().isqrt() as u32;
+                (UVec3::new(side, side, 1), level.iter().map(|t| f32::from(t[k]) / 255.0).collect())
+            };
+            Texture::new(levels.iter().map(float).collect(), Address::Repeat).unwrap()
+        };
+        for i in 0..500 {
+            let at = DVec2::new(0.0137 * f64::from(i) - 3.0, 0.0291 * f64::from(i) - 5.0);
+            let level = 0.009 * f64::from(i) - 0.5;
+            let found = sample_bytes(&levels, at, level);
+            for k in 0..4 {
+                let exact = channel(k).sample(at.extend(0.0), level);
+                assert!((found[k] - exact).abs() < 1e-6, "{at} level {level}: {found}, not {exact}");
+            }
+        }
+        for x in [f64::NAN, f64::INFINITY, -1e300] {
+            let _ = sample_bytes(&levels, DVec2::splat(x), x);
+        }
     }
 
     #[test]

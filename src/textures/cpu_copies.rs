@@ -10,10 +10,10 @@ use bevy::{
 
 use super::{CloudTextureSlot, texel::decoder};
 use crate::reference::{
-    field::OCTAVES,
     keeper::CloudFieldError,
-    query::CloudTextureSet,
+    query::{CloudTextureSet, LayerTextureSet},
     sampler::{Address, Texture},
+    texture_set::{DETAIL_SHARES, OCTAVES, SHAPE_SHARES},
 };
 
 /// What both worlds share.
@@ -48,11 +48,12 @@ impl CpuCopies {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// All textures, once they are there.
-    pub(crate) fn get(&self) -> Result<CloudTextureSet, CloudFieldError> {
+    /// All textures, once they are there. What `layers` read may be missing still.
+    pub(crate) fn get(&self, layers: bool) -> Result<CloudTextureSet, CloudFieldError> {
         let copies = self.lock();
-        match CloudTextureSlot::OF_MODEL.into_iter().find(|slot| copies.unreadable[*slot as usize]) {
-            Some(slot) => Err(CloudFieldError::Unreadable { slot }),
+        let of_layers: &[_] = if layers { &CloudTextureSlot::OF_LAYERS } else { &[] };
+        match CloudTextureSlot::OF_MODEL.iter().chain(of_layers).find(|slot| copies.unreadable[**slot as usize]) {
+            Some(slot) => Err(CloudFieldError::Unreadable { slot: *slot }),
             None => copies.set.clone().ok_or(CloudFieldError::NotReady),
         }
     }
@@ -100,9 +101,10 @@ impl Copies {
     }
 
     pub fn deliver(&mut self, slot: CloudTextureSlot, read: Vec<Texture>) {
-        use CloudTextureSlot::{Billow, Coverage, Gradient, TypeMap, Wisp};
+        use CloudTextureSlot::{Billow, Coverage, Detail, Gradient, Shape, TypeMap, Wisp};
         self.channels[slot as usize] = read.into_iter().map(Arc::new).collect();
         let channel = |slot: CloudTextureSlot, i: usize| self.channels[slot as usize].get(i).cloned();
+        let layers = (|| Some(LayerTextureSet::new(channel(Shape, 0)?, channel(Shape, 1)?, channel(Detail, 0)?)))();
         self.set = (|| {
             Some(CloudTextureSet {
                 billow: channel(Billow, 0)?,
@@ -111,6 +113,7 @@ impl Copies {
                 coverage_bound: channel(Coverage, 1)?,
                 type_map: channel(TypeMap, 0)?,
                 gradient: channel(Gradient, 0)?,
+                layers,
             })
         })();
     }
@@ -118,12 +121,19 @@ impl Copies {
 
 /// The channels that are kept of a texel.
 fn kept(slot: CloudTextureSlot, texel: [f32; 4]) -> [f32; 2] {
+    let sum =
+        |channels: &[f32], shares: &[f32]| channels.iter().zip(shares).map(|(channel, share)| channel * share).sum();
     match slot {
-        CloudTextureSlot::Billow | CloudTextureSlot::Wisp => {
-            [texel.iter().zip(OCTAVES).map(|(channel, share)| channel * share).sum(), 0.0]
-        }
+        CloudTextureSlot::Billow | CloudTextureSlot::Wisp => [sum(&texel, &OCTAVES), 0.0],
+        CloudTextureSlot::Shape => [texel[0], sum(&texel[1..], &SHAPE_SHARES)],
+        CloudTextureSlot::Detail => [sum(&texel[..3], &DETAIL_SHARES), 0.0],
         _ => [texel[0], texel[1]],
     }
+}
+
+/// Whether two channels are kept.
+fn keeps_two(slot: CloudTextureSlot) -> bool {
+    matches!(slot, CloudTextureSlot::Coverage | CloudTextureSlot::Shape)
 }
 
 /// Channels kept of a slot, with the levels read so far.
@@ -151,7 +161,7 @@ impl Channels {
             for texel in row[..size.x as usize * self.texel_bytes].chunks_exact(self.texel_bytes) {
                 let [a, b] = kept(self.slot, (self.decode)(texel));
                 first.push(a);
-                if self.slot == CloudTextureSlot::Coverage {
+                if keeps_two(self.slot) {
                     second.push(b);
                 }
             }
@@ -162,7 +172,7 @@ impl Channels {
         let address = if self.slot == CloudTextureSlot::Gradient { Address::Clamp } else { Address::Repeat };
         let (first, second): (Vec<_>, Vec<_>) = self.levels.into_iter().map(|[a, b]| (a, b)).unzip();
         let mut channels = vec![Texture::new(first, address)?];
-        if self.slot == CloudTextureSlot::Coverage {
+        if keeps_two(self.slot) {
             channels.push(Texture::new(second, address)?);
         }
         Some(channels)

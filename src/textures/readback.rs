@@ -164,7 +164,8 @@ fn advance(bakery: Option<Res<Bakery>>, copies: Res<CpuCopies>, mut reader: ResM
 impl Reader {
     /// Begins with the first slot that shows something new.
     fn begin(&mut self, bakery: &Bakery, copies: &CpuCopies) {
-        for slot in CloudTextureSlot::OF_MODEL {
+        // Layers' volumes are shown from the first layer on.
+        for slot in CloudTextureSlot::OF_MODEL.into_iter().chain(CloudTextureSlot::OF_LAYERS) {
             let Some((content, texture)) = bakery.shown(slot) else { continue };
             if self.seen[slot as usize].as_ref() == Some(content) {
                 continue;

@@ -67,6 +67,9 @@ impl CloudTextureSlot {
     /// Those that say where cloud is.
     pub(crate) const OF_MODEL: [Self; 5] = [Self::Gradient, Self::Coverage, Self::TypeMap, Self::Billow, Self::Wisp];
 
+    /// Those that weather-map layers read.
+    pub(crate) const OF_LAYERS: [Self; 2] = [Self::Shape, Self::Detail];
+
     fn handle(self, slots: &CloudTextureSlots) -> Option<&Handle<Image>> {
         match self {
             Self::Billow => &slots.billow,

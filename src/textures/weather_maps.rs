@@ -72,7 +72,7 @@ pub(crate) struct WeatherMaps {
     pub maps: [Option<Arc<WeatherPyramid>>; MAX_LAYERS],
     version: u32,
     /// Whether a map is still to come.
-    pub(super) pending: bool,
+    pub(crate) pending: bool,
 }
 
 impl LayerMaps {
@@ -186,7 +186,7 @@ fn of_channels(map: WeatherMap, channels: MapChannels) -> WeatherMap {
 }
 
 /// Follows the layers: makes what they ask for, forgets what nobody does.
-pub(super) fn follow_layers(
+pub(crate) fn follow_layers(
     good: Res<GoodSettings>,
     weather: Option<Res<CloudWeather>>,
     assets: Option<Res<AssetServer>>,
@@ -298,9 +298,8 @@ pub(super) fn upload(
     mut views: ResMut<CloudTextureViews>,
 ) {
     if views.swirl.is_none() {
-        let swirl = Swirl::generate();
-        let levels = swirl.levels();
-        views.swirl = Some(array(&device, &queue, "cloud_swirl", &[&levels], TextureViewDimension::D2));
+        let levels = Swirl::shared();
+        views.swirl = Some(array(&device, &queue, "cloud_swirl", &[levels], TextureViewDimension::D2));
         uploaded.0 = None;
     }
     views.maps_pending = maps.pending;
@@ -310,7 +309,7 @@ pub(super) fn upload(
     uploaded.0 = Some(maps.version);
     let size = maps.maps.iter().flatten().map(|map| map.size).max().unwrap_or(1);
     let last = maps.maps.iter().rposition(Option::is_some).map_or(1, |i| i + 1);
-    let blank = vec![vec![[0; 4]; (size * size) as usize]; size.ilog2() as usize + 1]
+    let blank: Levels = vec![vec![[0; 4]; (size * size) as usize]; size.ilog2() as usize + 1]
         .into_iter()
         .enumerate()
         .map(|(level, mut texels)| {
@@ -318,8 +317,8 @@ pub(super) fn upload(
             texels
         })
         .collect();
-    let layers: Vec<&Levels> =
-        maps.maps[..last].iter().map(|map| map.as_ref().map_or(&blank, |map| &map.levels)).collect();
+    let layers: Vec<&[Vec<[u8; 4]>]> =
+        maps.maps[..last].iter().map(|map| map.as_ref().map_or(&*blank, |map| &map.levels)).collect();
     views.weather = Some(array(&device, &queue, "cloud_weather", &layers, TextureViewDimension::D2Array));
     views.weather_size = size;
     views.weather_layers = std::array::from_fn(|i| maps.maps[i].is_some());
@@ -330,7 +329,7 @@ fn array(
     device: &RenderDevice,
     queue: &RenderQueue,
     label: &'static str,
-    layers: &[&Levels],
+    layers: &[&[Vec<[u8; 4]>]],
     dimension: TextureViewDimension,
 ) -> bevy::render::render_resource::TextureView {
     let side = (layers[0][0].len() as f32).sqrt().round() as u32;

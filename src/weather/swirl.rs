@@ -1,5 +1,7 @@
 //! A plane of noise for what has no volume: which way turbulence curls, and the fibres and cells of thin cloud.
 
+use std::sync::OnceLock;
+
 use super::{
     lattice::Lattice,
     noise::{Cellular, Octaves},
@@ -13,7 +15,7 @@ pub(crate) struct Swirl(Vec<[u8; 4]>);
 
 impl Swirl {
     /// The same on every machine.
-    pub fn generate() -> Self {
+    fn generate() -> Self {
         let size = SWIRL_SIZE as usize;
         let potential = Octaves::new(11, 4.0, 0.0, SWIRL_SIZE, 3);
         let fibres = Octaves::new(12, 6.0, 20.0, SWIRL_SIZE, 5);
@@ -48,8 +50,14 @@ impl Swirl {
         )
     }
 
+    /// Levels of detail of the one that all share, finest first; made when it is first asked for.
+    pub fn shared() -> &'static [Vec<[u8; 4]>] {
+        static LEVELS: OnceLock<Vec<Vec<[u8; 4]>>> = OnceLock::new();
+        LEVELS.get_or_init(|| Self::generate().levels())
+    }
+
     /// Levels of detail, each the mean of the one before, finest first.
-    pub fn levels(self) -> Vec<Vec<[u8; 4]>> {
+    fn levels(self) -> Vec<Vec<[u8; 4]>> {
         let mut levels = vec![self.0];
         let mut side = SWIRL_SIZE as usize;
         while side > 1 {

@@ -1,17 +1,18 @@
 //! The CPU twin of the model: the same answers as the GPU's, kept up to date, and only if asked for.
 
 mod kept;
+mod layers;
 mod light;
 
 use bevy::{
-    math::{DVec2, DVec3},
+    math::{DVec2, DVec3, DVec4},
     prelude::*,
 };
 use bevy_cumulus::{
     CloudsPlugin, ModelShader,
     prelude::*,
     reference::{
-        field::{LocalModel, ModelTextures},
+        field::{LayerSides, LocalModel, ModelTextures},
         planet::Planet,
         query::CloudTextureSet,
         sampler::Texture,
@@ -120,6 +121,22 @@ impl ModelTextures for Perturbed<'_> {
         }
         exact + self.sign * error
     }
+    // There are no layers here; those are in `layers`.
+    fn layer_sides(&self) -> Option<LayerSides> {
+        None
+    }
+    fn shape(&self, at: DVec3, level: f64) -> [f64; 2] {
+        self.exact.shape(at, level)
+    }
+    fn detail(&self, at: DVec3, level: f64) -> f64 {
+        self.exact.detail(at, level)
+    }
+    fn weather(&self, layer: usize, at: DVec2, level: f64) -> DVec4 {
+        self.exact.weather(layer, at, level)
+    }
+    fn swirl(&self, at: DVec2, level: f64) -> DVec4 {
+        self.exact.swirl(at, level)
+    }
 }
 
 /// Error of the type that the map's filter and f32 leave: the steepest the type map gets between two texels, over 256.
@@ -217,10 +234,10 @@ fn gpu_and_cpu_agree_on_100_000_points_to_the_texture_filters_precision() {
         assert_eq!((sky.model(), sky.seconds()), (&model, seconds));
         let textures = sky.textures();
         let [low, high] = [-1.0, 1.0].map(|sign| Perturbed { exact: textures, sign });
-        let planet = Planet::default();
-        let twin = LocalModel::new(&model, seconds, camera, planet, textures).unwrap();
-        let low = LocalModel::new(&model, seconds, camera, planet, &low).unwrap();
-        let high = LocalModel::new(&model, seconds, camera, planet, &high).unwrap();
+        let (planet, none) = (Planet::default(), CloudLayers::default());
+        let twin = LocalModel::new(&model, &none, seconds, camera, planet, textures).unwrap();
+        let low = LocalModel::new(&model, &none, seconds, camera, planet, &low).unwrap();
+        let high = LocalModel::new(&model, &none, seconds, camera, planet, &high).unwrap();
         let (mut own, mut widths) = (Vec::new(), Vec::new());
         for (point, gpu) in points.iter().zip(&found) {
             let [density, extinction, profile, bound] = gpu.map(f64::from);

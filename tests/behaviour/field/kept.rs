@@ -13,6 +13,7 @@ use bevy::{
 use bevy_cumulus::{
     CloudFieldError, ModelShader,
     prelude::*,
+    reference::field::ModelTextures,
     textures::{
         CloudTextureSlot,
         capture::{self, Captured},
@@ -21,7 +22,7 @@ use bevy_cumulus::{
 
 use super::{field_app, sky, small, until_current};
 use crate::{
-    gpu::run_updates,
+    gpu::{run_until, run_updates},
     view::{clouds_app, clouds_app_with, spawn_sun},
 };
 
@@ -69,6 +70,18 @@ fn every_texel_of_every_level_comes_back() {
     assert_same(&app, CloudTextureSlot::TypeMap, |at, l| textures.type_map.sample(at, l), |t| t[0]);
     assert_same(&app, CloudTextureSlot::Gradient, |at, l| textures.gradient.sample(at, l), |t| t[0]);
     assert_eq!(textures.bytes(), 4 * (2 * 37_449 + 3 * 349_525 + 65_536));
+
+    // Layers' volumes come with the first layer.
+    assert!(textures.layers.is_none());
+    app.insert_resource(CloudLayers(vec![super::layers::sheet()]));
+    until_current(&mut app);
+    let here = sky(&app);
+    let layers = here.textures().layers.as_ref().expect("there is a layer");
+    let worley = |[_, g, b, a]: [f32; 4]| 0.625 * g + 0.25 * b + 0.125 * a;
+    let octaves = |[r, g, b, _]: [f32; 4]| (0.5 * r + 0.25 * g + 0.125 * b) / 0.875;
+    assert_same(&app, CloudTextureSlot::Shape, |at, l| layers.shape.sample(at, l), |t| t[0]);
+    assert_same(&app, CloudTextureSlot::Shape, |at, l| layers.shape_octaves.sample(at, l), worley);
+    assert_same(&app, CloudTextureSlot::Detail, |at, l| layers.detail.sample(at, l), octaves);
 
     // A user's volume that can be copied, in slices; and the same as the main world has it.
     let size = UVec3::new(96, 64, 80);
@@ -138,6 +151,72 @@ fn the_twin_follows_settings_clock_sun_and_textures() {
     app.world_mut().resource_mut::<Assets<Image>>().insert(handle.id(), grey(204)).unwrap();
     until_current(&mut app);
     assert!((coverage(&app) - 0.8).abs() < 1e-3, "{}", coverage(&app));
+}
+
+#[test]
+fn the_twin_follows_layers() {
+    let mut app = field_app(small(1));
+    app.insert_resource(CloudModel { enabled: false, ..default() });
+    run_updates(&mut app, 1);
+    let p = Vec3::new(2000.0, 3000.0, -500.0);
+    let clear = sky(&app);
+    assert_eq!((clear.density(p, 0.0), clear.transmittance(p, p * 2.0)), (0.0, 1.0));
+    let solid = CloudLayer {
+        map: super::layers::map(1, 20_000.0, 8.0),
+        coverage: 1.0,
+        base: 2900.0,
+        base_rise: 0.0,
+        thickness: 4000.0,
+        shape_strength: 0.0,
+        detail_strength: 0.0,
+        profile_strength: 4.0,
+        ..default()
+    };
+    app.insert_resource(CloudLayers(vec![solid.clone()]));
+    run_updates(&mut app, 1);
+    // The old sky stays until the layer's map and volumes are here.
+    assert!(!app.world().resource::<CloudField>().is_current() && sky(&app).density(p, 0.0) == 0.0);
+    until_current(&mut app);
+    let overcast = sky(&app);
+    assert!(overcast.is_in_cloud(p) && !overcast.is_in_cloud(p - Vec3::Y * 200.0), "{:?}", overcast.medium(p, 0.0));
+    assert!(overcast.transmittance(Vec3::Y * 10.0, Vec3::Y * 20_000.0) < 1e-6);
+    assert_eq!(clear.density(p, 0.0), 0.0);
+    // A setting at once; another map when it is made.
+    app.world_mut().resource_mut::<CloudLayers>().0[0].density = 0.25;
+    run_updates(&mut app, 1);
+    assert!((sky(&app).density(p, 0.0) - 0.25 * overcast.density(p, 0.0)).abs() < 1e-9);
+    let coverage = |app: &App| sky(app).textures().weather(0, bevy::math::DVec2::splat(0.3), 0.0);
+    let before = coverage(&app);
+    app.world_mut().resource_mut::<CloudLayers>().0[0].map.seed = 77;
+    until_current(&mut app);
+    assert_ne!(coverage(&app), before);
+    // What is wrong or disabled is not there.
+    app.world_mut().resource_mut::<CloudLayers>().0[0].density = -3.0;
+    run_updates(&mut app, 1);
+    assert!(sky(&app).density(p, 0.0) > 0.0);
+    app.insert_resource(CloudLayers(vec![CloudLayer { enabled: false, ..solid }]));
+    run_updates(&mut app, 1);
+    assert_eq!(sky(&app).density(p, 0.0), 0.0);
+}
+
+#[test]
+fn a_sky_of_layers_is_not_told_of_before_they_are_there() {
+    let mut app = clouds_app_with((CloudFieldPlugin, CloudsPlugin));
+    app.insert_resource(small(1)).insert_resource(CloudLayers(vec![super::layers::storm()]));
+    run_until(&mut app, "there is a sky", 900, |app| app.world().resource::<CloudField>().is_ready());
+    let textures = sky(&app).textures().clone();
+    assert!(textures.layers.is_some() && textures.layer_sides().is_some_and(|sides| sides.maps[0]));
+    // A volume that nobody can read back is said of where there is a layer to read it, and only there.
+    let mut image = volume(UVec3::splat(8));
+    image.asset_usage = RenderAssetUsages::RENDER_WORLD;
+    image.texture_descriptor.usage -= TextureUsages::COPY_SRC;
+    put(&mut app, image, |slots, image| slots.shape = Some(image));
+    until_current(&mut app);
+    let error = |app: &App| app.world().resource::<CloudField>().get().err().cloned();
+    assert_eq!(error(&app), Some(CloudFieldError::Unreadable { slot: CloudTextureSlot::Shape }));
+    app.insert_resource(CloudLayers::default());
+    run_updates(&mut app, 1);
+    assert_eq!(error(&app), None);
 }
 
 #[test]

@@ -8,10 +8,11 @@ use bevy_cumulus::{
         field::LocalModel,
         planet::{Planet, layer_intervals},
     },
+    settings::CloudZone,
 };
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
-use super::{field_app, sky, small};
+use super::{field_app, layers, sky, small, until_current};
 use crate::{gpu::run_updates, twins::on_gpu_with, view::spawn_sun};
 
 const STEPS: u32 = 4096;
@@ -66,21 +67,20 @@ fn spread(values: &[f64]) -> [usize; 3] {
     [count(0.999..2.0), count(0.05..0.95), count(-1.0..0.05)]
 }
 
-#[test]
-fn transmittance_is_that_of_a_fine_march_on_the_gpu() {
-    let mut app = field_app(small(4));
-    cloudy(&mut app);
-    let sky = sky(&app);
+/// Transmittances from the twin, and the worst and the mean of their differences from marches on the GPU.
+fn against_the_gpu(app: &mut App, seconds: f64, segments: usize) -> (Vec<f64>, f64, f64) {
+    let sky = sky(app);
     let mut rng = StdRng::seed_from_u64(80);
     let (mut all, mut worst, mut bias) = (Vec::new(), 0.0_f64, 0.0);
     for _ in 0..8 {
         let camera = eye(&mut rng);
-        let ends: Vec<DVec3> = (0..64)
+        let ends: Vec<DVec3> = (0..segments)
             .map(|_| camera + direction(&mut rng, -0.5..0.5) * 10_f64.powf(rng.random_range(2.0..4.3)))
             .collect();
-        let twin = LocalModel::new(sky.model(), 900.0, camera, Planet::default(), sky.textures()).unwrap();
+        let planet = Planet::default();
+        let twin = LocalModel::new(sky.model(), sky.layers(), seconds, camera, planet, sky.textures()).unwrap();
         let segments: Vec<[f32; 6]> = ends.iter().map(|b| local(&twin, camera, *b)).collect();
-        for (b, depth) in ends.iter().zip(march_on_gpu(&mut app, camera, &segments)) {
+        for (b, depth) in ends.iter().zip(march_on_gpu(app, camera, &segments)) {
             let (gpu, cpu) = ((-depth).exp(), sky.transmittance(camera, *b));
             worst = worst.max((gpu - cpu).abs());
             bias += gpu - cpu;
@@ -89,8 +89,37 @@ fn transmittance_is_that_of_a_fine_march_on_the_gpu() {
     }
     bias /= all.len() as f64;
     println!("{:?} clear, dimmed, dark; worst {worst:.5}, mean {bias:+.6}", spread(&all));
+    (all, worst, bias)
+}
+
+#[test]
+fn transmittance_is_that_of_a_fine_march_on_the_gpu() {
+    let mut app = field_app(small(4));
+    cloudy(&mut app);
+    let (all, worst, bias) = against_the_gpu(&mut app, 900.0, 64);
     assert!(spread(&all).iter().all(|n| *n > 50), "{:?}", spread(&all));
     assert!(worst < 0.005 && bias.abs() < 3e-4, "worst {worst}, mean {bias}");
+}
+
+#[test]
+fn transmittance_through_layers_is_that_of_a_fine_march_on_the_gpu() {
+    let mut app = field_app(small(4));
+    cloudy(&mut app);
+    let thin = |layer: CloudLayer| CloudLayer { extinction: layer.extinction * 0.1, ..layer };
+    app.insert_resource(CloudLayers(vec![
+        CloudLayer { coverage: -0.35, rain: 0.3, ..thin(layers::storm()) },
+        CloudLayer { extinction: 0.002, base: 2500.0, coverage: -0.3, far_coverage: 0.0, ..layers::sheet() },
+    ]));
+    app.insert_resource(CloudModel { coverage: 0.0, ..app.world().resource::<CloudModel>().clone() });
+    // One place is cleared, one is overcast.
+    for (x, strength) in [(-9000.0, -1.0), (9000.0, 0.7)] {
+        let zone = CloudZone { radius: 7000.0, edge: 3000.0, strength };
+        app.world_mut().spawn((zone, Transform::from_xyz(x, 0.0, 2000.0)));
+    }
+    until_current(&mut app);
+    let (all, worst, bias) = against_the_gpu(&mut app, 900.0, 32);
+    assert!(spread(&all).iter().all(|n| *n > 5), "{:?}", spread(&all));
+    assert!(worst < 0.005 && bias.abs() < 5e-4, "worst {worst}, mean {bias}");
 }
 
 #[test]
@@ -110,7 +139,8 @@ fn sunlight_is_that_of_a_fine_march_on_the_gpu() {
         let towards = sky.sun().expect("there is a sun");
         for _ in 0..8 {
             let camera = eye(&mut rng);
-            let twin = LocalModel::new(sky.model(), 900.0, camera, Planet::default(), sky.textures()).unwrap();
+            let twin =
+                LocalModel::new(sky.model(), sky.layers(), 900.0, camera, Planet::default(), sky.textures()).unwrap();
             let up = twin.local_direction(towards).y;
             let parts = layer_intervals(twin.eye_altitude(), up, twin.bounds(), twin.radius(), f64::INFINITY);
             let segments: Vec<[f32; 6]> =
@@ -155,7 +185,7 @@ fn the_quadrature_is_as_good_as_it_says() {
         for _ in 0..40 {
             let a = eye(&mut rng);
             let b = a + direction(&mut rng, -0.3..0.3) * 10_f64.powf(rng.random_range(2.0..4.0));
-            let twin = LocalModel::new(sky.model(), 0.0, a, Planet::default(), sky.textures()).unwrap();
+            let twin = LocalModel::new(sky.model(), sky.layers(), 0.0, a, Planet::default(), sky.textures()).unwrap();
             let length = (b - a).length();
             let steps = (length / 0.5) as u32;
             let at = |k: u32| twin.local(a.lerp(b, (f64::from(k) + 0.5) / f64::from(steps)));
