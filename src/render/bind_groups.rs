@@ -120,9 +120,7 @@ pub(crate) fn prepare_bind_groups(
     device: Res<RenderDevice>,
     status: Res<StatusFlags>,
 ) {
-    // What layers read comes after what the thesis's layer does.
-    let layers_wait = textures.maps_pending || textures.bake_pending && textures.shape.is_none();
-    let mut ready = !views.is_empty() && !layers_wait;
+    let mut ready = !views.is_empty();
     for item in &views {
         let own;
         let sky_light = match item.sky_light {
@@ -161,7 +159,10 @@ pub(crate) fn prepare_bind_groups(
             }
         }
     }
-    status.set_views_ready(ready);
+    // What layers read comes after what the thesis's layer does.
+    let layers_wait =
+        textures.maps_pending || textures.bake_pending && textures.layers_wanted && textures.shape.is_none();
+    status.set_views(ready, !layers_wait);
 }
 
 fn view_bind_groups(

@@ -10,6 +10,7 @@ use bevy::prelude::*;
 #[derive(Default, Debug)]
 pub(crate) struct SharedStatus {
     views_ready: AtomicBool,
+    views_drawn: AtomicBool,
     unsupported: OnceLock<String>,
 }
 
@@ -18,8 +19,8 @@ pub(crate) struct SharedStatus {
 pub struct CloudStatus(pub(crate) Arc<SharedStatus>);
 
 impl CloudStatus {
-    /// Whether the textures are baked and the pipelines of every view with clouds are compiled. Until then nothing
-    /// is drawn. False while no camera shows clouds.
+    /// Whether the textures are baked, the maps of all layers made and the pipelines of every view with clouds compiled.
+    /// At first nothing is drawn until then; later what is there goes on being drawn. False while no camera shows clouds.
     pub fn is_ready(&self) -> bool {
         self.0.views_ready.load(Ordering::Acquire)
     }
@@ -40,12 +41,14 @@ impl CloudStatus {
 pub(crate) struct StatusFlags(pub Arc<SharedStatus>);
 
 impl StatusFlags {
-    pub fn set_views_ready(&self, ready: bool) {
-        self.0.views_ready.store(ready, Ordering::Release);
+    /// Whether views are drawn, and whether all that they are to show is there.
+    pub fn set_views(&self, drawn: bool, complete: bool) {
+        self.0.views_drawn.store(drawn, Ordering::Release);
+        self.0.views_ready.store(drawn && complete, Ordering::Release);
     }
 
     /// Whether the last frame was drawn: only then does it count towards a window.
     pub fn views_were_drawn(&self) -> bool {
-        self.0.views_ready.load(Ordering::Acquire)
+        self.0.views_drawn.load(Ordering::Acquire)
     }
 }

@@ -125,6 +125,8 @@ pub(crate) struct CloudTextureViews {
     pub maps_pending: bool,
     /// Whether anything is still to be baked or loaded.
     pub bake_pending: bool,
+    /// Whether there are layers.
+    pub layers_wanted: bool,
     /// Rg a curl field, b fibres, a cells.
     pub swirl: Option<TextureView>,
     pub generation: u64,
@@ -280,6 +282,7 @@ pub(super) fn plan(
         }
     }
     views.bake_pending = !satisfied;
+    views.layers_wanted = wanted.layers;
     report(&mut bakery, satisfied, &wanted, &images, &progress);
 }
 
