@@ -26,6 +26,7 @@
 //! |---|---|
 //! | settings | [`CloudModel`], [`CloudLighting`], [`CloudQuality`], [`CloudTextures`], [`CloudClock`]; checks; presets |
 //! | textures | noise volumes, cloud maps, blue noise; slots for your own |
+//! | phases | phase functions that are tables: computed, or your own |
 //! | model | the shader module that says where cloud is; [`ModelShader`] replaces it |
 //! | render | the passes of each camera with a [`CloudView`] |
 //!
@@ -52,7 +53,7 @@ use bevy::{
     shader::ShaderLoader,
 };
 
-pub use model::ModelShader;
+pub use model::{ModelShader, ModelShaderError};
 pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
 pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},

@@ -223,7 +223,6 @@ impl Plan {
             ("--size", self.size == other.size),
             ("--no-sky", self.sky == other.sky),
             ("--msaa", self.msaa == other.msaa),
-            ("the exposure", self.ev100 == other.ev100),
             ("--debug", self.debug == other.debug),
             ("a setting of textures", self.settings.textures == other.settings.textures),
         ];
@@ -234,6 +233,7 @@ impl Plan {
     pub fn effective(&self) -> Effective<'_> {
         Effective {
             model: &self.settings.model,
+            layers: &self.settings.layers,
             lighting: &self.settings.lighting,
             quality: &self.settings.quality,
             textures: &self.settings.textures,
@@ -258,6 +258,7 @@ impl Plan {
 #[derive(Serialize)]
 pub struct Effective<'a> {
     model: &'a CloudModel,
+    layers: &'a CloudLayers,
     lighting: &'a CloudLighting,
     quality: &'a CloudQuality,
     textures: &'a CloudTextures,

@@ -70,6 +70,7 @@ pub fn shoot_many(plans: &[Plan], mut done: impl FnMut(&Plan, &Shot) -> Result<(
     studio.make_ready(first, SETTLING_FRAMES)?;
     for plan in plans {
         set(studio.app.world_mut(), &plan.settings);
+        studio.expose(plan);
         studio.pose(plan, 0);
         studio.make_ready(plan, SETTLED_FRAMES)?;
         let timings = studio.count_frames(plan)?;
@@ -291,6 +292,13 @@ impl Studio {
                 "the picture did not come back from the GPU within {} s",
                 BACK_WITHIN.as_secs()
             );
+        }
+    }
+
+    /// Exposes as the plan says.
+    fn expose(&mut self, plan: &Plan) {
+        if let Some(mut exposure) = self.app.world_mut().get_mut::<bevy::camera::Exposure>(self.camera) {
+            exposure.ev100 = plan.ev100;
         }
     }
 

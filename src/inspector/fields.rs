@@ -10,7 +10,7 @@ use bevy::{
         enums::{DynamicEnum, DynamicVariant, EnumInfo},
     },
 };
-use bevy_egui::egui::{self, DragValue, Slider, SliderClamping, Ui};
+use bevy_egui::egui::{self, DragValue, Slider, SliderClamping, TextEdit, Ui};
 
 use crate::settings::snake_case;
 
@@ -23,6 +23,11 @@ const LEAST_OF_SIGNED: f64 = 0.01;
 
 /// A row for each field: name, widget, and the field's documentation as tooltip. True where the user changed one.
 pub(super) fn struct_ui(ui: &mut Ui, value: &mut dyn PartialReflect) -> bool {
+    some_fields_ui(ui, value, |_| true)
+}
+
+/// [`struct_ui`] of the fields with these names.
+pub(super) fn some_fields_ui(ui: &mut Ui, value: &mut dyn PartialReflect, shown: impl Fn(&str) -> bool) -> bool {
     let Some(TypeInfo::Struct(info)) = value.get_represented_type_info() else {
         ui.label("not a struct");
         return false;
@@ -32,8 +37,11 @@ pub(super) fn struct_ui(ui: &mut Ui, value: &mut dyn PartialReflect) -> bool {
     egui::Grid::new(info.type_path()).num_columns(2).striped(true).show(ui, |ui| {
         for index in 0..info.field_len() {
             let (Some(declared), Some(field)) = (info.field_at(index), fields.field_at_mut(index)) else { continue };
+            if !shown(declared.name()) {
+                continue;
+            }
             let docs = plain_docs(declared.docs());
-            ui.label(declared.name().replace('_', " ")).on_hover_text(&docs);
+            ui.label(words(declared.name())).on_hover_text(&docs);
             // Scoped, so that the tooltip also shows over the widget's empty parts.
             let row = ui.scope(|ui| field_ui(ui, declared, field));
             row.response.on_hover_text(docs);
@@ -42,6 +50,11 @@ pub(super) fn struct_ui(ui: &mut Ui, value: &mut dyn PartialReflect) -> bool {
         }
     });
     changed
+}
+
+/// A field's name as it is shown.
+pub(super) fn words(name: &str) -> String {
+    name.replace('_', " ")
 }
 
 /// The widget of one field. True where the user changed it.
@@ -59,8 +72,16 @@ fn field_ui(ui: &mut Ui, declared: &NamedField, field: &mut dyn PartialReflect) 
         parts_ui(ui, [("x ", &mut v.x), ("y ", &mut v.y), ("z ", &mut v.z)], range)
     } else if let Some(v) = field.try_downcast_mut::<DVec3>() {
         parts_ui(ui, [("x ", &mut v.x), ("y ", &mut v.y), ("z ", &mut v.z)], range)
+    } else if let Some(v) = field.try_downcast_mut::<String>() {
+        text_ui(ui, declared.name(), v)
+    } else if let Some(v) = field.try_downcast_mut::<Option<Handle<Image>>>() {
+        let there = v.is_some();
+        ui.weak(if there { "an image" } else { "none; set in code" });
+        there && ui.button("Clear").clicked() && v.take().is_some()
     } else if let Some(TypeInfo::Enum(info)) = field.get_represented_type_info() {
         enum_ui(ui, declared.name(), info, field)
+    } else if matches!(field.reflect_ref(), ReflectRef::Struct(_)) {
+        ui.collapsing(words(declared.name()), |ui| struct_ui(ui, field)).body_returned.unwrap_or_default()
     } else {
         ui.weak("set in code");
         false
@@ -134,6 +155,23 @@ fn parts_ui<N: egui::emath::Numeric>(
     range: Option<&RangeInclusive<f32>>,
 ) -> bool {
     ui.horizontal(|ui| parts.into_iter().fold(false, |changed, (name, v)| drag_ui(ui, name, v, range) | changed)).inner
+}
+
+/// A line of text, which counts once it is left or entered: half a path is none.
+fn text_ui(ui: &mut Ui, name: &str, value: &mut String) -> bool {
+    let id = ui.make_persistent_id(("text", name));
+    let mut edited = ui.data(|data| data.get_temp(id)).unwrap_or_else(|| value.clone());
+    let response = ui.add(TextEdit::singleline(&mut edited).id(id).desired_width(170.0));
+    if response.has_focus() {
+        ui.data_mut(|data| data.insert_temp(id, edited));
+        return false;
+    }
+    ui.data_mut(|data| data.remove_temp::<String>(id));
+    let changed = response.lost_focus() && edited != *value;
+    if changed {
+        *value = edited;
+    }
+    changed
 }
 
 /// A choice among the variants of an enum that carry nothing.

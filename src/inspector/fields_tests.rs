@@ -87,7 +87,8 @@ fn every_setting_has_a_widget() {
 #[test]
 fn a_slider_changes_its_own_field_within_its_range() {
     let (mut screen, mut model) = (Screen::new(), CloudModel::default());
-    assert!(!play(&mut screen, &mut model, [vec![], press(Key::Tab), vec![]]));
+    // The first field is a switch.
+    assert!(!play(&mut screen, &mut model, [vec![], press(Key::Tab), vec![], press(Key::Tab), vec![]]));
     assert_eq!(model, CloudModel::default());
     assert!(play(&mut screen, &mut model, [press(Key::ArrowRight)]));
     assert!(model.bottom > CloudModel::default().bottom, "{}", model.bottom);
@@ -100,8 +101,9 @@ fn a_slider_changes_its_own_field_within_its_range() {
 #[test]
 fn a_number_is_typed_in_and_kept_within_its_range() {
     let (mut screen, mut model) = (Screen::new(), CloudModel::default());
-    // The second stop is the slider's number box, which opens with all of it selected.
-    play(&mut screen, &mut model, [vec![], press(Key::Tab), vec![], press(Key::Tab), vec![], vec![]]);
+    // The stop after the slider is its number box, which opens with all of it selected.
+    let tab = || [press(Key::Tab), vec![]];
+    play(&mut screen, &mut model, [vec![]].into_iter().chain([tab(), tab(), tab(), [vec![], vec![]]].concat()));
     let typed = vec![Event::Text("99999999".to_owned())];
     assert!(!play(&mut screen, &mut model, [typed]), "taken while it was being typed");
     assert!(play(&mut screen, &mut model, [press(Key::Enter), vec![]]));
@@ -139,6 +141,8 @@ struct Others {
     #[reflect(@-10.0..=10.0_f32)]
     at: DVec3,
     /// Cannot be edited.
+    letter: char,
+    /// A text.
     name: String,
 }
 
@@ -156,8 +160,52 @@ fn a_switch_and_a_vector_are_edited() {
 fn a_field_of_another_type_is_named_not_hidden() {
     let mut value = Others::default();
     let texts = Screen::new().frame(vec![], |ui| _ = struct_ui(ui, value.as_partial_reflect_mut()));
-    find(&texts, "name");
+    find(&texts, "letter");
     find(&texts, "set in code");
+}
+
+#[test]
+fn a_text_is_taken_when_it_is_entered() {
+    let (mut screen, mut value) = (Screen::new(), Others::default());
+    for _ in 0..5 {
+        play(&mut screen, &mut value, [vec![], press(Key::Tab), vec![]]);
+    }
+    let typed = |text: &str| vec![Event::Text(text.to_owned())];
+    assert!(!play(&mut screen, &mut value, [typed("low "), vec![], typed("deck"), vec![]]), "taken while it was typed");
+    assert!(play(&mut screen, &mut value, [press(Key::Enter), vec![]]));
+    assert_eq!(value, Others { name: "low deck".to_owned(), ..Others::default() });
+    assert!(!play(&mut screen, &mut value, [vec![], vec![]]));
+}
+
+#[derive(Reflect, Default, PartialEq, Debug, Clone)]
+struct Outer {
+    /// A struct in it.
+    inner: Others,
+    /// An image.
+    image: Option<Handle<Image>>,
+}
+
+#[test]
+fn a_struct_within_is_opened_and_edited_and_an_image_cleared() {
+    let mut value = Outer { image: Some(Handle::default()), ..Outer::default() };
+    let mut screen = Screen::new();
+    let draw = |screen: &mut Screen, value: &mut Outer, events| {
+        let mut changed = false;
+        let texts = screen.frame(events, |ui| changed |= struct_ui(ui, value.as_partial_reflect_mut()));
+        (changed, texts)
+    };
+    let (_, texts) = draw(&mut screen, &mut value, vec![]);
+    assert!(!texts.iter().any(|(text, _)| text == "letter"), "it is open");
+    // The label of the row is the first of this name, the section the second.
+    let section = texts.iter().rfind(|(text, _)| text == "inner").expect("a section").1;
+    for events in click(section).into_iter().chain(vec![vec![]; 8]) {
+        assert!(!draw(&mut screen, &mut value, events).0);
+    }
+    let (_, texts) = draw(&mut screen, &mut value, vec![]);
+    find(&texts, "letter");
+    let clear = find(&texts, "Clear");
+    assert!(click(clear).into_iter().fold(false, |changed, events| changed | draw(&mut screen, &mut value, events).0));
+    assert_eq!(value, Outer::default());
 }
 
 #[test]
@@ -184,8 +232,16 @@ fn documentation_becomes_plain_text() {
 #[test]
 fn every_setting_has_a_tooltip() {
     let settings = crate::CloudSettings::default();
-    let all: [&dyn PartialReflect; 5] =
-        [&settings.model, &settings.lighting, &settings.quality, &settings.textures, &settings.clock];
+    let layer = crate::CloudLayer::default();
+    let all: [&dyn PartialReflect; 7] = [
+        &settings.model,
+        &settings.lighting,
+        &settings.quality,
+        &settings.textures,
+        &settings.clock,
+        &layer,
+        &layer.map,
+    ];
     for value in all {
         for field in declared(value) {
             assert!(plain_docs(field.docs()).len() > 5, "{} has no documentation", field.name());

@@ -13,7 +13,7 @@ use bevy_egui::egui::{self, Color32, TextEdit, Ui};
 use super::fields::plain_docs;
 use crate::{
     settings::{CloudLayers, CloudLighting, CloudModel, CloudPreset, CloudTextureSlots, CloudTextures, Validate},
-    textures::CloudTextureError,
+    textures::{CloudTextureError, weather_maps::asset_path},
 };
 
 /// The end of every preset file's name, which the asset loader goes by.
@@ -37,6 +37,11 @@ impl Default for PresetState {
 }
 
 impl PresetState {
+    /// The presets that come with the crate, with their names.
+    pub fn built_in(&self) -> &[(&'static str, CloudPreset)] {
+        &self.built_in
+    }
+
     /// Shows the presets; `current` is what would be saved. Returns one that was chosen or loaded; it is already
     /// validated.
     pub fn ui(&mut self, ui: &mut Ui, current: &CloudPreset) -> Option<CloudPreset> {
@@ -59,7 +64,7 @@ impl PresetState {
                 chosen = self.load();
             }
             let tip =
-                "Writes model, lighting, textures and the sun's elevation to this file; what is in it is replaced";
+                "Writes model, layers, lighting, textures and the sun's elevation to this file; what is in it is replaced";
             if ui.button("Save").on_hover_text(tip).clicked() {
                 self.save(current);
             }
@@ -121,7 +126,9 @@ fn sun_advice(preset: &CloudPreset) -> String {
         Some(elevation) => format!("Made for a sun {elevation:.0}° above the horizon"),
         None => "Made for any sun".to_owned(),
     };
-    format!("{made_for}. Sets model, lighting and textures; the light is the app's, which is told and may move it.")
+    format!(
+        "{made_for}. Sets model, layers, lighting and textures; the light is the app's, which is told and may move it."
+    )
 }
 
 /// The preset that the settings and the scene's brightest light amount to.
@@ -214,19 +221,6 @@ impl SlotsState {
 
 fn shown(handle: &Handle<Image>, server: &AssetServer) -> String {
     server.get_path(handle.id()).map_or_else(|| "an image made in code".to_owned(), |path| path.to_string())
-}
-
-/// The path, if the asset server would load it.
-fn asset_path(text: &str) -> Result<AssetPath<'static>, String> {
-    let text = text.trim();
-    let path = AssetPath::try_parse(text).map_err(|error| format!("{text:?} is not an asset path: {error}"))?;
-    if text.is_empty() {
-        Err("give the path of an image".to_owned())
-    } else if path.is_unapproved() {
-        Err(format!("{text} lies outside the assets folder, from which the app loads nothing"))
-    } else {
-        Ok(path.into_owned())
-    }
 }
 
 /// Loads an image the way the slots want it: linear, and repeating.

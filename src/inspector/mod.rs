@@ -11,6 +11,7 @@
 //! |---|---|
 //! | Preset | the built-in skies; loading and saving `*.clouds.ron`; [`CloudPresetChosen`] tells the app |
 //! | Modelling | [`CloudModel`](crate::CloudModel), [`CloudTextures`](crate::CloudTextures), the texture slots |
+//! | | the list of [`CloudLayers`](crate::CloudLayers): add, copy, move, rename, remove, and each layer's fields by group |
 //! | (a box) | [`CloudDebugView`](crate::CloudDebugView) of all cameras |
 //! | Rendering | [`CloudLighting`](crate::CloudLighting) |
 //! | Sampling | [`CloudQuality`](crate::CloudQuality) and its presets |
@@ -21,6 +22,7 @@
 
 mod fields;
 mod files;
+mod layers;
 mod panel;
 
 use bevy::{diagnostic::DiagnosticsStore, prelude::*};

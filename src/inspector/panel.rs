@@ -15,6 +15,7 @@ use super::{
     CloudInspector, CloudPresetChosen,
     fields::struct_ui,
     files::{PresetState, RED, SlotsState, current},
+    layers::LayersState,
 };
 use crate::{
     CloudStatus,
@@ -49,6 +50,7 @@ pub(super) struct Shown<'w, 's> {
 pub(super) struct PanelState {
     presets: PresetState,
     slots: SlotsState,
+    layers: LayersState,
     model: Section<CloudModel>,
     lighting: Section<CloudLighting>,
     quality: Section<CloudQuality>,
@@ -86,6 +88,7 @@ fn panel(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {
     part(ui, "Preset", true, |ui| presets_ui(ui, shown, state));
     part(ui, "Modelling", true, |ui| {
         part(ui, "Cloud layer", true, |ui| state.model.ui(ui, shown.model.as_mut(), When::AtOnce));
+        part(ui, "Weather-map layers", true, |ui| layers_ui(ui, shown, state));
         part(ui, "Baked textures", false, |ui| {
             if let Some(baking) = shown.baking.as_ref().filter(|status| status.baking) {
                 ui.add(egui::ProgressBar::new(baking.progress).text("baking"));
@@ -122,6 +125,16 @@ fn presets_ui(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {
         lighting.set_if_neq(preset.lighting.clone());
         textures.set_if_neq(preset.textures.clone());
         shown.chosen.write(CloudPresetChosen(preset));
+    }
+}
+
+fn layers_ui(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {
+    let Some(layers) = &mut shown.layers else {
+        ui.label("there is no CloudsPlugin");
+        return;
+    };
+    if let Some(good) = state.layers.edit(ui, layers, state.presets.built_in()) {
+        layers.set_if_neq(good);
     }
 }
 
@@ -232,9 +245,23 @@ impl<R: Resource<Mutability = Mutable> + Validate + Struct + Clone + PartialEq +
     /// Shows the fields. Returns what the resource should become, if the user changed it to something good; while
     /// `held` that is kept back.
     pub fn edit(&mut self, ui: &mut Ui, now: &R, held: bool) -> Option<R> {
+        self.edit_with(ui, now, held, |ui, value| struct_ui(ui, value.as_partial_reflect_mut()), settle)
+    }
+}
+
+impl<R: Validate + Clone + PartialEq + Default> Section<R> {
+    /// [`edit`](Section::edit), with what draws the fields and says whether the user changed one, and what validates.
+    pub fn edit_with(
+        &mut self,
+        ui: &mut Ui,
+        now: &R,
+        held: bool,
+        draw: impl FnOnce(&mut Ui, &mut R) -> bool,
+        settle: fn(&mut R) -> Result<(), SettingsError>,
+    ) -> Option<R> {
         self.draft.take_if(|draft| draft.base != *now);
         let mut value = self.draft.as_ref().map_or(now, |draft| &draft.value).clone();
-        let mut changed = struct_ui(ui, value.as_partial_reflect_mut());
+        let mut changed = draw(ui, &mut value);
         if let Some(error) = self.draft.as_ref().and_then(|draft| draft.error.as_ref()) {
             ui.colored_label(RED, format!("{error}; the last good value stays"));
         }
@@ -263,7 +290,7 @@ fn settle<R: Validate + Struct>(value: &mut R) -> Result<(), SettingsError> {
             Err(error) => error,
         };
         let SettingsError::NotPowerOfTwo { field, value: size, min, max } = &error else { return Err(error) };
-        let name = field.split_once('.').map_or(*field, |(_, name)| name);
+        let name = field.split_once('.').map_or(&**field, |(_, name)| name);
         let ReflectMut::Struct(fields) = value.reflect_mut() else { return Err(error) };
         let Some(target) = fields.field_mut(name).and_then(|field| field.try_downcast_mut::<u32>()) else {
             return Err(error);
@@ -277,7 +304,7 @@ fn settle<R: Validate + Struct>(value: &mut R) -> Result<(), SettingsError> {
 }
 
 /// The nearest on a logarithmic scale.
-fn nearest_power_of_two(size: u32) -> u32 {
+pub(super) fn nearest_power_of_two(size: u32) -> u32 {
     1 << f64::from(size.max(1)).log2().round().min(31.0) as u32
 }
 

@@ -21,12 +21,13 @@ where
 
 type Texts = Vec<(String, Pos2)>;
 
-/// Types a number into the box of the first field, and returns what became of it.
+/// Types a number into the box of the model's first number, which stands behind a switch, and returns what became of it.
 fn type_first<R>(screen: &mut Screen, section: &mut Section<R>, now: &R, number: &str) -> (Option<R>, Texts)
 where
     R: Resource<Mutability = Mutable> + Validate + Struct + Clone + PartialEq + Default,
 {
-    for events in [vec![], press(Key::Tab), vec![], press(Key::Tab), vec![], vec![]] {
+    let tabs = [vec![], press(Key::Tab), vec![], press(Key::Tab), vec![], press(Key::Tab), vec![], vec![]];
+    for events in tabs {
         edit(screen, section, now, events, false);
     }
     edit(screen, section, now, vec![Event::Text(number.to_owned())], false);
@@ -116,7 +117,8 @@ fn looking_at_a_setting_does_not_change_it() {
     let mut world = World::new();
     world.init_resource::<CloudModel>();
     world.insert_resource(Shows(Screen::new(), Section::default()));
-    for events in [vec![], press(Key::Tab), vec![], vec![Event::PointerMoved(Pos2::new(300.0, 60.0))], vec![]] {
+    let over = vec![Event::PointerMoved(Pos2::new(300.0, 60.0))];
+    for events in [vec![], press(Key::Tab), vec![], press(Key::Tab), vec![], over, vec![]] {
         assert!(!changes(&mut world, events));
     }
     assert!(changes(&mut world, press(Key::ArrowRight)));

@@ -1,10 +1,12 @@
 //! Where cloud is. Knows no camera, pass or history.
 //!
 //! The renderer sees a model through one shader module, `bevy_cumulus::model::model`, with the three functions
-//! that `medium.wesl` documents. The built-in one is the thesis's profile maps; [`ModelShader`] replaces it.
+//! that `medium.wesl` documents. The built-in one is the thesis's layer and weather-map layers; [`ModelShader`] replaces it.
 
 mod bindings;
+mod check;
 mod layers;
+mod lines;
 mod probe;
 mod space;
 mod uniform;
@@ -21,13 +23,24 @@ pub(crate) use zone_at::ZoneAt;
 /// Path whose module path is the model's: a shader registered under it takes the built-in one's place.
 const MODEL_PATH: &str = "embedded://bevy_cumulus/model/model.wesl";
 
-/// A model of your own, as WESL source, in place of the built-in one.
+/// A model of your own, as WESL source, in place of the built-in one (example `custom_model`).
 ///
 /// Insert it before adding [`CloudsPlugin`](crate::CloudsPlugin), or at any time later; bind group 1 stays as the
 /// built-in model declares it, and a model need not use any of it. The source must define the three functions of
-/// `bevy_cumulus::model::medium`'s comment. A compile error is logged with its line and no clouds are drawn.
+/// `bevy_cumulus::model::medium`'s comment. It is compiled on the CPU before it is shown: one that does not compile is logged
+/// with its line and told as [`ModelShaderError`], and the last good model stays, which is the built-in one at first.
 #[derive(Resource, Clone, Debug)]
 pub struct ModelShader(pub String);
+
+/// A [`ModelShader`] that does not compile. The last good model stays.
+#[derive(Message, Clone, PartialEq, Eq, Debug, thiserror::Error)]
+#[error("the model does not compile{}: {reason}", .line.map(|line| format!(", line {line}")).unwrap_or_default())]
+pub struct ModelShaderError {
+    /// Line of the source, from 1, where one is to blame.
+    pub line: Option<usize>,
+    /// What the compiler says.
+    pub reason: String,
+}
 
 /// The model's module: one asset for as long as the app lives, so that whatever it holds, pipelines follow.
 #[derive(Resource)]
@@ -47,7 +60,8 @@ impl Plugin for CloudModelPlugin {
         let built_in = Shader::from_wesl(include_str!("model.wesl"), MODEL_PATH);
         let module = app.world_mut().resource_mut::<Assets<Shader>>().add(built_in);
         app.insert_resource(ModelModule(module))
-            .add_systems(PreUpdate, replace_model.run_if(resource_exists_and_changed::<ModelShader>));
+            .add_message::<ModelShaderError>()
+            .add_systems(PreUpdate, replace_model.run_if(resource_exists::<ModelShader>));
     }
 }
 
@@ -59,13 +73,35 @@ fn model_deck(i: u32) -> vec2<f32> {
 }
 ";
 
-fn replace_model(source: Res<ModelShader>, module: Res<ModelModule>, mut shaders: ResMut<Assets<Shader>>) {
+fn replace_model(
+    source: Res<ModelShader>,
+    module: Res<ModelModule>,
+    mut shaders: ResMut<Assets<Shader>>,
+    mut loaded: MessageReader<AssetEvent<Shader>>,
+    mut errors: MessageWriter<ModelShaderError>,
+    mut waits: Local<bool>,
+) {
+    let more = loaded.read().any(|event| matches!(event, AssetEvent::Added { .. } | AssetEvent::Modified { .. }));
+    if !source.is_changed() && !(*waits && more) {
+        return;
+    }
     let mut text = source.0.clone();
     if !text.contains("fn model_deck") {
         text.push_str(ONE_DECK);
     }
-    let shader = Shader::from_wesl(text, MODEL_PATH);
-    if shaders.insert(module.0.id(), shader).is_err() {
-        error!("clouds: the model's shader asset is gone; the model was not replaced");
+    let verdict = check::check(&text, shaders.iter());
+    *waits = verdict == check::Verdict::Waits;
+    match verdict {
+        // What it imports is still loading; Bevy has logged what that is.
+        check::Verdict::Waits => {}
+        check::Verdict::Bad(error) => {
+            error!("clouds: {error}; the last good model stays");
+            errors.write(error);
+        }
+        check::Verdict::Good => {
+            if shaders.insert(module.0.id(), Shader::from_wesl(text, MODEL_PATH)).is_err() {
+                error!("clouds: the model's shader asset is gone; the model was not replaced");
+            }
+        }
     }
 }

@@ -33,6 +33,9 @@ impl ModelShader {
         let clock = app.world().get_resource::<CloudClock>().ok_or("no CloudClock")?;
         let world = app.get_sub_app(RenderApp).ok_or("no render app")?.world();
         let views = world.get_resource::<CloudTextureViews>().ok_or("no textures on this device")?;
+        if views.maps_pending {
+            return Err("a layer's map is not there yet".to_owned());
+        }
         let sizes = TexelSizes::of(views).ok_or("the textures are not there yet")?;
         let centre = DVec3::new(0.0, -PLANET_RADIUS, 0.0);
         let frame = TangentFrame::below(camera + model.world_offset, centre, PLANET_RADIUS)

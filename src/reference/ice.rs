@@ -12,7 +12,7 @@ use super::{
 const PEAK: f64 = 0.5;
 const PEAK_ASYMMETRY: f64 = 0.995;
 /// Light that goes through or is reflected: rough crystals show neither halo nor rainbow in it.
-const FORWARD_ASYMMETRY: f64 = 0.6;
+const FORWARD_ASYMMETRY: f64 = 0.57;
 const BACK: f64 = 0.05;
 const BACK_ASYMMETRY: f64 = -0.4;
 /// Share of the light through the crystals that a full halo takes: it is twice as bright as what lies within it.
@@ -36,7 +36,7 @@ pub fn halo_angle(index: f64) -> f64 {
 ///
 /// Rough crystals, as most of cirrus is found to be, have a smooth phase function without halo and an asymmetry of 0.75 to
 /// 0.8 (Baran 2009; Yang et al. 2013; van Diedenhoven et al. 2013): here diffraction's peak, a broad forward lobe and a
-/// weak backward one, 0.77 together. Smooth prisms bend light by no less than [`halo_angle`], and most of it by little
+/// weak backward one, 0.76 together. Smooth prisms bend light by no less than [`halo_angle`], and most of it by little
 /// more: the halo's edge is sharp and red on its inner side, where blue is not yet bent.
 pub fn table(halo: f64) -> PhaseTable {
     let ring = RING * halo.clamp(0.0, 1.0);

@@ -19,7 +19,8 @@ pub const EFFECTIVE_VARIANCE: f64 = 0.05;
 const SIZE_STEP: f64 = 0.45;
 const LARGE: f64 = 120.0;
 
-/// Refractive index of water at a wavelength (µm, 0.18 to 1.1): Daimon and Masumura (2007), 21.5 °C.
+/// Refractive index of water in air at a wavelength (µm, 0.18 to 1.1): Daimon and Masumura (2007), 21.5 °C, theirs in
+/// vacuum.
 pub fn water_index(wavelength: f64) -> f64 {
     const TERMS: [[f64; 2]; 4] = [
         [5.689093832e-1, 5.110301794e-3],
@@ -27,8 +28,9 @@ pub fn water_index(wavelength: f64) -> f64 {
         [2.062501582e-2, 2.624158904e-2],
         [1.123965424e-1, 1.067505178e1],
     ];
+    const AIR: f64 = 1.00027;
     let square = wavelength * wavelength;
-    (1.0 + TERMS.iter().map(|[strength, pole]| strength * square / (square - pole)).sum::<f64>()).sqrt()
+    (1.0 + TERMS.iter().map(|[strength, pole]| strength * square / (square - pole)).sum::<f64>()).sqrt() / AIR
 }
 
 /// A sphere of size x = 2πr/λ and real refractive index m.
@@ -54,9 +56,10 @@ pub struct Efficiencies {
 impl Sphere {
     /// Bohren and Huffman's equations 4.88, 4.89 with the logarithmic derivative by downward recurrence.
     pub fn new(x: f64, m: f64) -> Self {
-        // Wiscombe (1980), for sizes up to 4200.
-        let count = (x + 4.05 * x.cbrt() + 2.0) as usize;
-        let start = count.max((m * x) as usize) + 16;
+        // Wiscombe (1980), for sizes up to 4200. The derivative's recurrence forgets its start only where n is above mx.
+        let beyond = |x: f64| (x + 4.05 * x.cbrt() + 2.0) as usize;
+        let count = beyond(x);
+        let start = count.max(beyond(m * x)) + 16;
         let mut derivative = vec![0.0; start + 1];
         for n in (1..=start).rev() {
             let ratio = n as f64 / (m * x);
@@ -64,7 +67,7 @@ impl Sphere {
         }
         let (mut psi, mut chi) = ([x.cos(), x.sin()], [-x.sin(), x.cos()]);
         let mut terms = Vec::with_capacity(count);
-        for n in 1..=count {
+        for (n, derivative) in derivative.into_iter().enumerate().take(count + 1).skip(1) {
             let up = (2 * n - 1) as f64 / x;
             psi = [psi[1], up * psi[1] - psi[0]];
             chi = [chi[1], up * chi[1] - chi[0]];
@@ -74,7 +77,7 @@ impl Sphere {
                 let size = p * p + q * q;
                 [p * p / size, p * q / size]
             };
-            let ([a_re, a_im], [b_re, b_im]) = (part(derivative[n] / m), part(derivative[n] * m));
+            let ([a_re, a_im], [b_re, b_im]) = (part(derivative / m), part(derivative * m));
             terms.push([a_re, a_im, b_re, b_im]);
         }
         Self { x, terms }
@@ -153,7 +156,7 @@ impl Default for Angle {
 /// The phase function of water droplets of this effective diameter (µm), whose radii r are spread by
 /// `r^((1−3b)/b) e^(−r/ab)` with a the effective radius and b = [`EFFECTIVE_VARIANCE`] (Hansen and Travis 1974).
 ///
-/// Takes about 0.2 s for 10 µm and 20 times as long for 50 µm.
+/// Takes about 0.3 s for 10 µm and 3 s for 50 µm on one core, as a release build.
 pub fn droplets(diameter: f64) -> PhaseTable {
     let cosines: Vec<f64> = (0..=HALF).map(|i| 1.0 - node(i)).collect();
     let mut halves = [0, 1].map(|_| vec![DVec3::ZERO; HALF + 1]);

@@ -33,6 +33,8 @@ pub(crate) struct FrameInput<'a> {
     pub exposure: f32,
     pub quality: &'a CloudQuality,
     pub lighting: &'a CloudLighting,
+    /// Distance at which high layers pass below the horizon (m): they are never cut off before it.
+    pub highest_horizon: f32,
     pub phases: &'a PhaseSlots,
     pub window: FrameInWindow,
     pub debug: CloudDebugView,
@@ -84,7 +86,7 @@ impl FrameUniform {
         let FrameInput { space, sun, quality, lighting, phases, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();
         let size = marched_size(*viewport, quality);
-        let reach = reach(quality, lighting, space);
+        let reach = reach(quality, lighting, space).max(input.highest_horizon);
         let [first_thinning, first_eccentricity] = phases.first_octave(lighting);
         let held = if quality.is_path_traced() { window.index + 1 } else { window.held_after() };
         Self {

@@ -296,6 +296,7 @@ pub(crate) fn prepare_views(
             exposure: item.camera.exposure,
             quality: &item.cloud.quality,
             lighting: &lighting,
+            highest_horizon: layers.highest_horizon(space.radius),
             phases: &phases,
             window,
             debug: item.cloud.debug,

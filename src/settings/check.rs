@@ -58,7 +58,7 @@ pub enum SettingsError {
     #[error("{field} = {value} must be a power of two from {min} to {max}")]
     NotPowerOfTwo {
         /// Path of the field.
-        field: &'static str,
+        field: String,
         /// What it was set to.
         value: u32,
         /// Least allowed value.
@@ -135,7 +135,7 @@ impl Validate for CloudTextures {
             [("textures.volume_size", self.volume_size, 32, 256), ("textures.map_size", self.map_size, 64, 4096)]
         {
             if !value.is_power_of_two() {
-                return Err(SettingsError::NotPowerOfTwo { field, value, min, max });
+                return Err(SettingsError::NotPowerOfTwo { field: field.to_owned(), value, min, max });
             }
         }
         Ok(())

@@ -55,7 +55,7 @@ pub struct CloudLayer {
     pub map: WeatherRecipe,
     /// Path of an image asset in the recipe's place; it tiles over `map.scale`. Hot-reloaded. Default none.
     pub map_file: String,
-    /// An image in the recipe's place.
+    /// An image in the recipe's place, and in the file's: set in code. Default none.
     #[serde(skip)]
     pub map_image: Option<Handle<Image>>,
     /// What is read from that image. Default [`MapChannels::Rgb`].
@@ -258,6 +258,15 @@ impl CloudLayers {
         self.0.iter().enumerate().filter(|(_, layer)| layer.enabled).take(MAX_LAYERS)
     }
 
+    /// Distance from the ground to where the bases of high layers pass below the horizon (m); 0 without any. Cirrus is seen
+    /// much farther than cumulus, and few long steps show it.
+    pub(crate) fn highest_horizon(&self, radius: f64) -> f32 {
+        /// Lower layers end at `quality.max_distance` (m).
+        const HIGH: f32 = 2500.0;
+        let bases = self.shown().map(|(_, layer)| layer.base).filter(|base| *base > HIGH);
+        bases.map(|base| (2.0 * radius * f64::from(base)).sqrt() as f32).fold(0.0, f32::max)
+    }
+
     /// The different phase functions of layers that have their own: slots 1 to 3.
     pub(crate) fn phases(&self) -> Vec<CloudPhase> {
         let mut phases = Vec::new();
@@ -278,6 +287,11 @@ impl Validate for CloudLayers {
             return Err(SettingsError::TooManyLayers { count: self.0.len(), most: MAX_LAYERS });
         }
         for (i, layer) in self.0.iter().enumerate() {
+            let size = layer.map.size;
+            if !size.is_power_of_two() {
+                let field = format!("layers.{i}.map.size");
+                return Err(SettingsError::NotPowerOfTwo { field, value: size, min: 64, max: 2048 });
+            }
             if layer.far_end <= layer.far_start {
                 return Err(SettingsError::Inverted {
                     low: format!("layers.{i}.far_start"),

@@ -13,26 +13,29 @@ use super::PhaseFunction;
 #[serde(default, deny_unknown_fields)]
 pub struct CloudLighting {
     /// Terms N of the multiple-scattering sum (thesis, 3.8): 1 is single scattering, 0 no sunlight. Each costs
-    /// one exponential a sample. Default 3.
+    /// one exponential a sample. With `diffusion` each but the first holds only what the one before it has lost on the
+    /// way: in thin cloud nothing is scattered twice. Default 3.
     #[reflect(@0..=16_u32)]
     pub octaves: u32,
-    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.35.
+    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.4,
+    /// fitted to the path tracer.
     #[reflect(@0.0..=1.0_f32)]
     pub attenuation: f32,
-    /// b: factor on the contribution from one octave to the next; at most `attenuation` keeps energy
-    /// bounded. Default 0.18.
+    /// b: factor on the contribution from one octave to the next. Energy is bounded with `diffusion`, and without it
+    /// where this is at most `attenuation`. Default 1, fitted.
     #[reflect(@0.0..=1.0_f32)]
     pub contribution: f32,
-    /// c: factor on the phase function's asymmetry from one octave to the next (Wrenninge). Default 0.24.
+    /// c: factor on the phase function's asymmetry from one octave to the next (Wrenninge). Default 0.6,
+    /// fitted.
     #[reflect(@0.0..=1.0_f32)]
     pub eccentricity: f32,
     /// Strength of the sun's light that has been scattered so often that it diffuses, which the octaves lose (with two
     /// octaves or more): radiance at the lit side, in units of the sun's illuminance over 4π. Inside it is weighed
     /// against sky and ground by the optical depth to each; costs five samples of the medium. 0 is the thesis alone.
-    /// Default 8, fitted to the path tracer.
+    /// Default 5.5, fitted to the path tracer.
     #[reflect(@0.0..=40.0_f32)]
     pub diffusion: f32,
-    /// Asymmetry of that light: how much of it goes on away from the sun (0 all ways alike). Default 0.38, fitted.
+    /// Asymmetry of that light: how much of it goes on away from the sun (0 all ways alike). Default 0.15, fitted.
     #[reflect(@0.0..=0.9_f32)]
     pub diffusion_asymmetry: f32,
     /// The phase function of layers that have none of their own. Default [`PhaseFunction::HgDraine`].
@@ -61,7 +64,8 @@ pub struct CloudLighting {
     /// Factor on the sun's illuminance. Default 1: as the scene's light says.
     #[reflect(@0.0..=100.0_f32)]
     pub sun_strength: f32,
-    /// Factor on the ambient light (sky from above, ground from below). Default 1.15, fitted.
+    /// Factor on the ambient light: sky and ground around the cloud, and what of them shines through where it is thin.
+    /// Default 1.
     #[reflect(@0.0..=100.0_f32)]
     pub ambient_strength: f32,
     /// Tint of the ambient light, linear RGB. Default white.
@@ -89,11 +93,11 @@ impl Default for CloudLighting {
     fn default() -> Self {
         Self {
             octaves: 3,
-            attenuation: 0.35,
-            contribution: 0.18,
-            eccentricity: 0.24,
-            diffusion: 8.0,
-            diffusion_asymmetry: 0.38,
+            attenuation: 0.4,
+            contribution: 1.0,
+            eccentricity: 0.6,
+            diffusion: 5.5,
+            diffusion_asymmetry: 0.15,
             phase: PhaseFunction::HgDraine,
             g: 0.8,
             g_back: -0.3,
@@ -102,7 +106,7 @@ impl Default for CloudLighting {
             halo: 0.0,
             phase_limit: 500.0,
             sun_strength: 1.0,
-            ambient_strength: 1.15,
+            ambient_strength: 1.0,
             ambient_tint: Vec3::ONE,
             sky_fallback: Vec3::new(0.026, 0.037, 0.055),
             ground_albedo: Vec3::new(0.2, 0.2, 0.18),

@@ -25,7 +25,7 @@ pub enum PhaseFunction {
     #[default]
     HgDraine,
     /// Mie's theory itself for droplets of `droplet_diameter`, in colour: fogbow, glory and corona. Computed in the
-    /// background, in a fraction of a second at 10 µm and seconds at 50; until then it is the fit above, as it always is
+    /// background, in 0.3 s at 10 µm and 3 s at 50; until then it is the fit above, as it always is
     /// in octaves after the first.
     Mie,
     /// The ice crystals of cirrus, rough ones, with a 22° halo of strength `halo`. Octaves after the first have no halo.

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use bevy::{
-    asset::AssetId,
+    asset::{AssetId, AssetPath, LoadState},
     image::ImageLoaderSettings,
     prelude::*,
     render::{
@@ -30,7 +30,15 @@ const LARGEST: u32 = 2048;
 #[derive(Clone, PartialEq, Debug)]
 enum Source {
     Recipe(WeatherRecipe),
-    Image { image: AssetId<Image>, revision: u32, channels: MapChannels },
+    Image {
+        image: AssetId<Image>,
+        revision: u32,
+        channels: MapChannels,
+    },
+    /// The file's path is none.
+    NoPath {
+        reason: String,
+    },
 }
 
 /// Texels of each level, finest first.
@@ -85,7 +93,10 @@ impl LayerMaps {
         let id = match self.files.iter().find(|(path, _)| *path == layer.map_file) {
             Some((_, handle)) => handle.id(),
             None => {
-                let handle = load_linear(assets, layer.map_file.clone());
+                let handle = match asset_path(&layer.map_file) {
+                    Ok(path) => load_linear(assets, path),
+                    Err(reason) => return Source::NoPath { reason },
+                };
                 self.files.push((layer.map_file.clone(), handle.clone()));
                 handle.id()
             }
@@ -94,13 +105,13 @@ impl LayerMaps {
     }
 
     /// The map of a source once it is made; begins to make it.
-    fn find(&mut self, source: &Source, layer: usize, images: &Assets<Image>) -> Option<Arc<WeatherMap>> {
+    fn find(&mut self, source: &Source, images: &Images) -> Result<Option<Arc<WeatherMap>>, String> {
         if let Some(entry) = self.entries.iter_mut().find(|entry| entry.source == *source) {
             if let Some(made) = entry.task.as_mut().and_then(|task| block_on(poll_once(task))) {
                 entry.task = None;
                 entry.map = Some(Arc::new(made));
             }
-            return entry.map.clone();
+            return Ok(entry.map.clone());
         }
         let mut entry = Entry { source: source.clone(), task: None, map: None };
         match source {
@@ -110,26 +121,52 @@ impl LayerMaps {
                 let make = async move { recipe.generate().unwrap_or_else(|_| WeatherMap::clear(UVec2::ONE)) };
                 entry.task = Some(AsyncComputeTaskPool::get().spawn(make));
             }
-            Source::Image { image, channels, .. } => match images.get(*image).map(WeatherMap::from_image) {
-                None => return None,
-                Some(Ok(map)) => entry.map = Some(Arc::new(of_channels(map, *channels))),
-                Some(Err(error)) => {
-                    if !self.told.contains(source) {
-                        error!("clouds: layers.{layer}.map: {error}; the last good map stays");
-                        self.told.push(source.clone());
-                    }
-                    return None;
-                }
+            Source::Image { image, channels, .. } => match images.get(*image)? {
+                None => return Ok(None),
+                Some(map) => entry.map = Some(Arc::new(of_channels(map, *channels))),
             },
+            Source::NoPath { reason } => return Err(format!("map_file: {reason}")),
         }
         self.entries.push(entry);
-        self.entries.last().and_then(|entry| entry.map.clone())
+        Ok(self.entries.last().and_then(|entry| entry.map.clone()))
+    }
+}
+
+/// Images as maps, and why there is none.
+struct Images<'a> {
+    loaded: &'a Assets<Image>,
+    server: Option<&'a AssetServer>,
+}
+
+impl Images<'_> {
+    /// The map in an image; `None` while it loads.
+    fn get(&self, image: AssetId<Image>) -> Result<Option<WeatherMap>, String> {
+        if let Some(image) = self.loaded.get(image) {
+            return WeatherMap::from_image(image).map(Some).map_err(|error| format!("map: {error}"));
+        }
+        match self.server.and_then(|server| server.get_load_state(image)) {
+            Some(LoadState::Failed(error)) => Err(format!("map_file did not load: {error}")),
+            _ => Ok(None),
+        }
     }
 }
 
 /// Loads an image whose bytes are numbers, not colours.
-fn load_linear(assets: &AssetServer, path: String) -> Handle<Image> {
+fn load_linear(assets: &AssetServer, path: AssetPath<'static>) -> Handle<Image> {
     assets.load_builder().with_settings(|settings: &mut ImageLoaderSettings| settings.is_srgb = false).load(path)
+}
+
+/// The path, if the asset server would load it.
+pub(crate) fn asset_path(text: &str) -> Result<AssetPath<'static>, String> {
+    let text = text.trim();
+    let path = AssetPath::try_parse(text).map_err(|error| format!("{text:?} is not an asset path: {error}"))?;
+    if text.is_empty() {
+        Err("give the path of an image".to_owned())
+    } else if path.is_unapproved() {
+        Err(format!("{text} lies outside the assets folder, from which the app loads nothing"))
+    } else {
+        Ok(path.into_owned())
+    }
 }
 
 /// One channel as coverage, or the map as it is.
@@ -169,24 +206,31 @@ pub(super) fn follow_layers(
         maps.published.pending = false;
         return;
     }
+    let images = Images { loaded: &images, server: assets.as_deref() };
     let in_transition = weather.as_ref().is_some_and(|weather| weather.has_moved());
     let mut wanted = Vec::new();
     let mut pending = false;
     let mut changed = false;
     for (i, layer) in good.0.layers.shown() {
-        let source = maps.source(layer, assets.as_deref());
-        match maps.find(&source, i, &images) {
-            Some(map) => {
+        let source = maps.source(layer, images.server);
+        match maps.find(&source, &images) {
+            Ok(Some(map)) => {
                 if maps.shown[i].as_ref().is_none_or(|(now, _)| *now != source) {
                     maps.shown[i] = Some((source.clone(), map));
                     changed = true;
                 }
             }
-            None => {
-                pending |= !maps.told.contains(&source);
+            Ok(None) => {
+                pending = true;
                 // A layer that forms must not show with another's map and then with its own.
                 if in_transition && maps.shown[i].take_if(|(now, _)| *now != source).is_some() {
                     changed = true;
+                }
+            }
+            Err(reason) => {
+                if !maps.told.contains(&source) {
+                    error!("clouds: layers.{i}.{reason}; the last good map stays");
+                    maps.told.push(source.clone());
                 }
             }
         }
@@ -195,11 +239,13 @@ pub(super) fn follow_layers(
     for layer in weather.iter().flat_map(|weather| weather.layers_ahead(good.0.clock.seconds)) {
         let source = maps.source(layer, assets.as_deref());
         if !wanted.contains(&source) {
-            maps.find(&source, 0, &images);
+            // What is wrong with it is told when its layer is shown.
+            let _ = maps.find(&source, &images);
             wanted.push(source);
         }
     }
     maps.published.pending = pending;
+    maps.told.retain(|source| wanted.contains(source));
     maps.entries.retain(|entry| wanted.contains(&entry.source));
     if changed {
         maps.publish();

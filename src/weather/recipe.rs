@@ -18,6 +18,7 @@ use crate::settings::{SettingsError, Validate};
 #[serde(default, deny_unknown_fields)]
 pub struct WeatherRecipe {
     /// Another seed gives another map of the same kind. Default 1.
+    #[reflect(@0..=4_294_967_295_u32)]
     pub seed: u32,
     /// Texels a side: a power of two. Default 512.
     #[reflect(@64..=2048_u32)]
@@ -159,7 +160,8 @@ impl Validate for WeatherRecipe {
 
     fn validate_relations(&self) -> Result<(), SettingsError> {
         if !self.size.is_power_of_two() {
-            return Err(SettingsError::NotPowerOfTwo { field: "weather.size", value: self.size, min: 64, max: 2048 });
+            let field = "weather.size".to_owned();
+            return Err(SettingsError::NotPowerOfTwo { field, value: self.size, min: 64, max: 2048 });
         }
         Ok(())
     }

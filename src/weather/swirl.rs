@@ -27,7 +27,7 @@ impl Swirl {
             for x in 0..size {
                 let at = [place(x), place(y)];
                 heights[y * size + x] = potential.at(at);
-                rest[y * size + x] = [0.5 + 0.55 * fibres.at(at), cells.at(at).bump];
+                rest[y * size + x] = [0.5 + 0.9 * fibres.at(at), cells.at(at).bump];
             }
         }
         // The curl of a height field runs along its contours, so it neither gathers nor scatters.

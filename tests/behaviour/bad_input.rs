@@ -38,10 +38,10 @@ fn is_bare(app: &App, view: &View) -> bool {
 }
 
 /// One bad change: what the error says, and the change.
-type Bad<S> = (&'static str, fn(&mut S));
+pub type Bad<S> = (&'static str, fn(&mut S));
 
 /// Makes each change, and asks that it be reported and the picture stay as it is.
-fn refuses<S>(app: &mut App, view: &View, changes: &[Bad<S>])
+pub fn refuses<S>(app: &mut App, view: &View, changes: &[Bad<S>])
 where
     S: Resource<Mutability = Mutable> + Validate + Clone,
 {

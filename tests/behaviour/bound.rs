@@ -5,41 +5,29 @@ use bevy_cumulus::{ModelShader, prelude::*, textures::CloudTextureStatus};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::{
-    gpu::{run_compute_with, run_until, run_updates},
+    gpu::{run_until, run_updates},
+    twins::on_gpu_with,
     view::clouds_app,
 };
 
 /// One question: p and lod for the bound, q and its lod for the medium.
-type Question = [f32; 8];
+pub type Question = [f32; 8];
 /// Bound, density, extinction, profile, bound of the extinction.
-type Answer = [f32; 5];
+pub type Answer = [f32; 5];
 
+const IMPORTS: &str = "import bevy_cumulus::model::model::{density_bound, extinction_bound, sample_medium};";
 const ASK: &str = "
-import bevy_cumulus::model::model::{density_bound, extinction_bound, sample_medium};
-
-@group(0) @binding(0) var<storage, read> values: array<f32>;
-@group(0) @binding(1) var<storage, read_write> results: array<f32>;
-
-@compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.x * 8u;
-    if i >= arrayLength(&values) {
-        return;
-    }
     let p = vec3<f32>(values[i], values[i + 1u], values[i + 2u]);
     let q = vec3<f32>(values[i + 4u], values[i + 5u], values[i + 6u]);
     let medium = sample_medium(q, values[i + 7u]);
-    let o = id.x * 5u;
     results[o] = density_bound(p, values[i + 3u]);
     results[o + 1u] = medium.density;
     results[o + 2u] = medium.extinction;
     results[o + 3u] = medium.profile;
-    results[o + 4u] = extinction_bound(p, values[i + 3u]);
-}
-";
+    results[o + 4u] = extinction_bound(p, values[i + 3u]);";
 
 /// An app whose textures are baked. No camera: the model does without.
-fn model_app() -> App {
+pub fn model_app() -> App {
     let mut app = clouds_app();
     run_until(&mut app, "the textures are baked", 600, |app| {
         !app.world().resource::<CloudTextureStatus>().baking && ModelShader::bindings(app, DVec3::ZERO).is_ok()
@@ -50,17 +38,15 @@ fn model_app() -> App {
     app
 }
 
-fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer> {
+pub fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer> {
     app.insert_resource(model.clone());
     let camera = DVec3::new(12_345.0, 10.0, -6789.0);
     let group = ModelShader::bindings(app, camera).expect("the model can be bound");
-    let count = questions.len();
-    let answers = run_compute_with(app, ASK, Some(&group), questions.as_flattened(), 5 * count, count as u32);
-    answers.as_chunks().0.to_vec()
+    on_gpu_with(app, Some(&group), IMPORTS, ASK, questions)
 }
 
 /// A point in the layer or around it, within 60 km.
-fn point(rng: &mut StdRng, model: &CloudModel) -> Vec3 {
+pub fn point(rng: &mut StdRng, model: &CloudModel) -> Vec3 {
     let away = 10_f32.powf(rng.random_range(1.0..4.8));
     let angle: f32 = rng.random_range(0.0..std::f32::consts::TAU);
     // What the surface falls away by: d²/2R.
@@ -71,7 +57,7 @@ fn point(rng: &mut StdRng, model: &CloudModel) -> Vec3 {
 }
 
 /// A question whose q lies within 2^lod metres of p, as often near as far, and asks at most as coarsely.
-fn question(rng: &mut StdRng, model: &CloudModel) -> Question {
+pub fn question(rng: &mut StdRng, model: &CloudModel) -> Question {
     let p = point(rng, model);
     let lod: f32 = rng.random_range(-1.0..13.0);
     let direction = loop {
@@ -131,7 +117,7 @@ fn nothing_is_denser_than_the_bound_around_it() {
 }
 
 /// Points only: p and q are one.
-fn at(p: Vec3, lod: f32) -> Question {
+pub fn at(p: Vec3, lod: f32) -> Question {
     [p.x, p.y, p.z, lod, p.x, p.y, p.z, lod]
 }
 

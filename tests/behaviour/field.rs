@@ -20,8 +20,8 @@ use bevy_cumulus::{
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::{
-    gpu::{run_compute_with, run_until, run_updates},
-    twins::U,
+    gpu::{run_until, run_updates},
+    twins::{U, on_gpu_with},
     view::clouds_app_with,
 };
 
@@ -47,26 +47,14 @@ pub fn small(seed: u32) -> CloudTextures {
     CloudTextures { seed, volume_size: 32, map_size: 128, ..default() }
 }
 
+const IMPORTS: &str = "import bevy_cumulus::model::model::{density_bound, sample_medium};";
 const ASK: &str = "
-import bevy_cumulus::model::model::{density_bound, sample_medium};
-
-@group(0) @binding(0) var<storage, read> values: array<f32>;
-@group(0) @binding(1) var<storage, read_write> results: array<f32>;
-
-@compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.x * 4u;
-    if i >= arrayLength(&values) {
-        return;
-    }
     let p = vec3<f32>(values[i], values[i + 1u], values[i + 2u]);
     let medium = sample_medium(p, values[i + 3u]);
-    results[i] = medium.density;
-    results[i + 1u] = medium.extinction;
-    results[i + 2u] = medium.profile;
-    results[i + 3u] = density_bound(p, values[i + 3u]);
-}
-";
+    results[o] = medium.density;
+    results[o + 1u] = medium.extinction;
+    results[o + 2u] = medium.profile;
+    results[o + 3u] = density_bound(p, values[i + 3u]);";
 
 /// The twin's textures, each reading as much too high (`sign` 1) or too low (−1) as a GPU's filter may get it.
 ///
@@ -224,8 +212,7 @@ fn gpu_and_cpu_agree_on_100_000_points_to_the_texture_filters_precision() {
         app.insert_resource(model.clone()).insert_resource(CloudClock { seconds, speed: 0.0 });
         let points: Vec<[f32; 4]> = (0..40_000).map(|_| point(&mut rng, &model)).collect();
         let group = ModelShader::bindings(&app, camera).expect("the model can be bound");
-        let count = points.len();
-        let found = run_compute_with(&mut app, ASK, Some(&group), points.as_flattened(), 4 * count, count as u32);
+        let found: Vec<[f32; 4]> = on_gpu_with(&mut app, Some(&group), IMPORTS, ASK, &points);
         let sky = sky(&app);
         assert_eq!((sky.model(), sky.seconds()), (&model, seconds));
         let textures = sky.textures();
@@ -235,7 +222,7 @@ fn gpu_and_cpu_agree_on_100_000_points_to_the_texture_filters_precision() {
         let low = LocalModel::new(&model, seconds, camera, planet, &low).unwrap();
         let high = LocalModel::new(&model, seconds, camera, planet, &high).unwrap();
         let (mut own, mut widths) = (Vec::new(), Vec::new());
-        for (point, gpu) in points.iter().zip(found.as_chunks::<4>().0) {
+        for (point, gpu) in points.iter().zip(&found) {
             let [density, extinction, profile, bound] = gpu.map(f64::from);
             let p = Vec3::from_slice(point).as_dvec3();
             let lod = f64::from(point[3]);

@@ -265,7 +265,7 @@ fn the_timings_file_has_every_key() {
         }
     }
     let settings = &timings["settings"];
-    for part in ["model", "lighting", "quality", "textures", "clock", "camera", "sun", "scene", "preset"] {
+    for part in ["model", "layers", "lighting", "quality", "textures", "clock", "camera", "sun", "scene", "preset"] {
         assert!(!settings[part].is_null(), "settings.{part} is missing");
     }
     assert_eq!(settings["model"]["density"], 0.9);
@@ -356,8 +356,10 @@ fn a_mistake_in_a_batch_is_named_with_its_line() {
 #[test]
 fn effective_prints_the_settings_and_renders_nothing() {
     let options = ["--effective", "--scene", "sunset", "--quality", "low", "--set", "model.density=0.7"];
+    let options = [&options[..], &["--set", "layers.0.map.cover=6.5", "--set", "layers.0.kind=sheet"]].concat();
     let output = run_in(&Folder::new(), &options);
     let all: Value = serde_json::from_slice(&output.stdout).expect("JSON");
     assert_eq!((&all["quality"]["resolution"], &all["scene"]), (&"Quarter".into(), &"sunset".into()));
     assert_eq!(all["model"]["density"], 0.7);
+    assert_eq!((&all["layers"][0]["map"]["cover"], &all["layers"][0]["kind"]), (&6.5.into(), &"Sheet".into()));
 }

@@ -9,11 +9,11 @@ use bevy::{
     asset::AssetPlugin,
     math::DVec3,
     prelude::*,
-    reflect::{NamedField, ReflectRef, TypeInfo, Typed, structs::Struct},
+    reflect::{GetPath, NamedField, ReflectRef, TypeInfo, Typed, structs::StructInfo},
 };
 use bevy_cumulus::{
     prelude::*,
-    settings::{CloudSettings, LayerKind, PresetError, SettingsError, Validate, snake_case},
+    settings::{CloudSettings, LayerKind, MAX_LAYERS, MapChannels, PresetError, SettingsError, Validate, snake_case},
 };
 use serde::{Serialize, de::DeserializeOwned};
 
@@ -26,7 +26,19 @@ fn unusual() -> CloudSettings {
             erosion: Erosion::Subtract,
             ..default()
         },
-        layers: CloudLayers(vec![CloudLayer { coverage: 0.25, kind: LayerKind::Sheet, ..default() }]),
+        layers: CloudLayers(vec![
+            CloudLayer::default(),
+            CloudLayer {
+                name: "high, thin".to_owned(),
+                coverage: 0.25,
+                kind: LayerKind::Sheet,
+                map: WeatherRecipe { cover: 6.5, seed: 77, ..default() },
+                map_file: "maps/sky.png".to_owned(),
+                map_channels: MapChannels::Blue,
+                drift: DVec3::new(-1.0e9, 0.5, 3.0),
+                ..default()
+            },
+        ]),
         lighting: CloudLighting { octaves: 3, phase: PhaseFunction::TwoLobe, ground_albedo: Vec3::X, ..default() },
         quality: CloudQuality { integration: Integration::Naive, window: 3, ..CloudQuality::low() },
         textures: CloudTextures { seed: u32::MAX, volume_size: 64, ..default() },
@@ -34,20 +46,23 @@ fn unusual() -> CloudSettings {
     }
 }
 
-fn parts(settings: &CloudSettings) -> [(&'static str, &dyn Struct); 5] {
-    [
-        ("model", &settings.model),
-        ("lighting", &settings.lighting),
-        ("quality", &settings.quality),
-        ("textures", &settings.textures),
-        ("clock", &settings.clock),
-    ]
-}
-
-fn field<'a>(settings: &'a CloudSettings, path: &str) -> &'a dyn PartialReflect {
-    let (root, name) = path.split_once('.').expect("a path has two parts");
-    let (_, part) = parts(settings).into_iter().find(|(known, _)| *known == root).expect("a root is a part");
-    part.field(name).expect("a path is a field")
+/// The field at a path, where there is one: that of a layer which is not there yet is not.
+fn field<'a>(settings: &'a CloudSettings, path: &str) -> Option<&'a dyn PartialReflect> {
+    let (root, rest) = path.split_once('.').expect("a path has two parts");
+    let part: &dyn Reflect = match root {
+        "model" => &settings.model,
+        "lighting" => &settings.lighting,
+        "quality" => &settings.quality,
+        "textures" => &settings.textures,
+        "clock" => &settings.clock,
+        "layers" => {
+            let (number, rest) = rest.split_once('.').expect("a layer has fields");
+            let layer = settings.layers.0.get(number.parse::<usize>().expect("layers are numbered"))?;
+            return Some(layer.reflect_path(rest).unwrap_or_else(|error| panic!("{path}: {error}")));
+        }
+        _ => panic!("{root} is no root"),
+    };
+    Some(part.reflect_path(rest).unwrap_or_else(|error| panic!("{path}: {error}")))
 }
 
 /// The field as [`CloudSettings::set`] takes it.
@@ -64,6 +79,8 @@ fn text_of(field: &dyn PartialReflect) -> String {
         v.to_string()
     } else if let Some(v) = field.try_downcast_ref::<bool>() {
         v.to_string()
+    } else if let Some(v) = field.try_downcast_ref::<String>() {
+        v.clone()
     } else if let ReflectRef::Enum(v) = field.reflect_ref() {
         snake_case(v.variant_name())
     } else {
@@ -71,25 +88,37 @@ fn text_of(field: &dyn PartialReflect) -> String {
     }
 }
 
-fn declarations<T: Typed>() -> Vec<&'static NamedField> {
-    match T::type_info() {
-        TypeInfo::Struct(info) => info.iter().collect(),
+fn struct_info(info: &'static TypeInfo) -> &'static StructInfo {
+    match info {
+        TypeInfo::Struct(info) => info,
         other => panic!("{} is not a struct", other.type_path()),
     }
 }
 
-fn all_declarations() -> Vec<(String, &'static NamedField)> {
-    let named = |root: &str, fields: Vec<&'static NamedField>| {
-        fields.into_iter().map(|f| (format!("{root}.{}", f.name()), f)).collect::<Vec<_>>()
+/// Every field below `root` with its path; of a struct within, its fields and not itself.
+fn declared_in(root: &str, info: &'static TypeInfo) -> Vec<(String, &'static NamedField)> {
+    let of = |field: &'static NamedField| {
+        let path = format!("{root}.{}", field.name());
+        let vector = field.is::<Vec3>() || field.is::<DVec3>();
+        match field.type_info() {
+            Some(inner @ TypeInfo::Struct(_)) if !vector => declared_in(&path, inner),
+            _ => vec![(path, field)],
+        }
     };
+    struct_info(info).iter().flat_map(of).collect()
+}
+
+/// Those of the settings that paths lead to, in the order of [`CloudSettings::paths`] where there are no layers; then others.
+fn all_declarations() -> Vec<(String, &'static NamedField)> {
     [
-        named("model", declarations::<CloudModel>()),
-        named("lighting", declarations::<CloudLighting>()),
-        named("quality", declarations::<CloudQuality>()),
-        named("textures", declarations::<CloudTextures>()),
-        named("clock", declarations::<CloudClock>()),
-        named("slots", declarations::<CloudTextureSlots>()),
-        named("view", declarations::<CloudView>()),
+        declared_in("model", CloudModel::type_info()),
+        declared_in("layers.0", CloudLayer::type_info()),
+        declared_in("lighting", CloudLighting::type_info()),
+        declared_in("quality", CloudQuality::type_info()),
+        declared_in("textures", CloudTextures::type_info()),
+        declared_in("clock", CloudClock::type_info()),
+        declared_in("slots", CloudTextureSlots::type_info()),
+        declared_in("view", CloudView::type_info()),
     ]
     .concat()
 }
@@ -140,40 +169,58 @@ fn the_contracts_paths_are_there() {
         ("lighting.phase", "henyey_greenstein"),
         ("lighting.phase", "hg_draine"),
         ("model.coverage", "0.25"),
+        ("layers.0.kind", "sheet"),
+        ("layers.0.map.cover", "6.5"),
     ] {
         assert!(paths.iter().any(|known| known == path), "{path} is gone");
         settings.set(path, value).unwrap_or_else(|error| panic!("{path}={value}: {error}"));
-        assert_eq!(text_of(field(&settings, path)), value, "{path}");
+        assert_eq!(text_of(field(&settings, path).expect(path)), value, "{path}");
     }
     // Each field is reached once, and nothing else is.
     let fields: Vec<String> = all_declarations().into_iter().map(|(path, _)| path).collect();
-    let settable: Vec<String> =
-        fields.into_iter().filter(|p| !p.starts_with("slots.") && !p.starts_with("view.")).collect();
+    let in_code = |p: &String| p.starts_with("slots.") || p.starts_with("view.") || p.ends_with(".map_image");
+    let settable: Vec<String> = fields.into_iter().filter(|p| !in_code(p)).collect();
     assert_eq!(paths, settable);
+}
+
+/// Texts that a field takes beside numbers: every choice, or some text.
+fn choices(info: &NamedField) -> Vec<String> {
+    if info.is::<bool>() {
+        vec!["true".to_owned(), "false".to_owned()]
+    } else if info.is::<String>() {
+        vec!["one".to_owned(), "two words".to_owned()]
+    } else if let Some(TypeInfo::Enum(choice)) = info.type_info() {
+        choice.variant_names().iter().map(|name| snake_case(name)).collect()
+    } else {
+        Vec::new()
+    }
 }
 
 #[test]
 fn every_path_takes_its_own_value_and_its_limits_and_no_more() {
     let declarations = all_declarations();
     for start in [CloudSettings::default(), unusual()] {
-        for path in start.paths() {
+        // Of a layer that is not there yet, another test asks.
+        let there: Vec<String> = start.paths().into_iter().filter(|path| field(&start, path).is_some()).collect();
+        for path in there {
             let mut settings = start.clone();
-            let own = text_of(field(&settings, &path));
+            let now = |settings: &CloudSettings| text_of(field(settings, &path).expect("a field"));
+            let own = now(&settings);
             settings.set(&path, &own).unwrap_or_else(|error| panic!("{path}={own}: {error}"));
             assert_eq!(settings, start, "{path}={own} changes something");
-            let info = declarations.iter().find(|(known, _)| *known == path).unwrap().1;
+            let declared = path.replace("layers.1.", "layers.0.");
+            let info = declarations.iter().find(|(known, _)| *known == declared).unwrap().1;
             let vector = info.is::<Vec3>() || info.is::<DVec3>();
             let spell = |n: &str| if vector { format!("{n},{n},{n}") } else { n.to_owned() };
             let mut values: Vec<String> = range_of(info).iter().flatten().map(|end| spell(end)).collect();
-            if info.is::<bool>() {
-                values = vec!["true".to_owned(), "false".to_owned()];
-            } else if let Some(TypeInfo::Enum(choice)) = info.type_info() {
-                values = choice.variant_names().iter().map(|name| snake_case(name)).collect();
-            }
+            values.extend(choices(info));
             assert!(values.len() >= 2, "{path} has no choice");
             for value in &values {
                 settings.set(&path, value).unwrap_or_else(|error| panic!("{path}={value}: {error}"));
-                assert_eq!(text_of(field(&settings, &path)), *value, "{path}");
+                assert_eq!(now(&settings), *value, "{path}");
+            }
+            if info.is::<String>() {
+                continue;
             }
             let kept = settings.clone();
             let beyond: Vec<String> = range_of(info).map(beyond).iter().flatten().map(|n| spell(n)).collect();
@@ -184,10 +231,35 @@ fn every_path_takes_its_own_value_and_its_limits_and_no_more() {
             }
         }
     }
-    for path in ["", "model", "model.", "model.colour", "sky.coverage", "model.coverage.x"] {
+    for path in ["", "model", "model.", "model.colour", "sky.coverage", "model.coverage.x", "layers.0", "layers.1.base"]
+    {
         let error = CloudSettings::default().set(path, "1").unwrap_err();
         assert_eq!(error, SettingsError::UnknownPath(path.to_owned()));
     }
+}
+
+#[test]
+fn a_path_into_the_layer_after_the_last_adds_it() {
+    let mut settings = CloudSettings::default();
+    for i in 0..MAX_LAYERS {
+        let next = format!("layers.{i}.");
+        assert!(settings.paths().iter().any(|path| path.starts_with(&next)), "{next} is not listed");
+        // What is refused adds nothing.
+        settings.set(&format!("{next}map.cover"), "9").expect_err("9 oktas");
+        settings.set(&format!("{next}colour"), "9").expect_err("no such field");
+        assert_eq!(settings.layers.0.len(), i);
+        settings.set(&format!("{next}map.cover"), "6.5").unwrap_or_else(|error| panic!("{next}: {error}"));
+        assert_eq!(settings.layers.0.len(), i + 1);
+        settings.set(&format!("{next}name"), "").expect("it is there");
+        assert_eq!(settings.layers.0.len(), i + 1, "set twice, added twice");
+    }
+    let recipe = WeatherRecipe { cover: 6.5, ..default() };
+    assert_eq!(settings.layers.0, vec![CloudLayer { map: recipe, ..default() }; MAX_LAYERS]);
+    settings.validate().expect("that many layers are shown");
+    assert!(!settings.paths().iter().any(|path| path.starts_with(&format!("layers.{MAX_LAYERS}."))));
+    let error = settings.set(&format!("layers.{MAX_LAYERS}.base"), "900").unwrap_err();
+    assert_eq!(error, SettingsError::TooManyLayers { count: MAX_LAYERS + 1, most: MAX_LAYERS });
+    assert_eq!(settings.layers.0.len(), MAX_LAYERS);
 }
 
 /// Numbers below and above the range, by more than its length.
@@ -208,6 +280,7 @@ fn round_trip<T: Serialize + DeserializeOwned + PartialEq + std::fmt::Debug>(val
 fn settings_are_read_back_as_written() {
     for settings in [CloudSettings::default(), unusual()] {
         round_trip(&settings.model);
+        round_trip(&settings.layers);
         round_trip(&settings.lighting);
         round_trip(&settings.quality);
         round_trip(&settings.textures);
@@ -262,7 +335,8 @@ fn presets_parse_validate_and_are_read_back_as_written() {
 fn bad_presets_name_file_line_and_field() {
     let error = CloudPreset::read("nowhere/sky.clouds.ron".as_ref()).unwrap_err();
     assert!(matches!(error, PresetError::Io { .. }) && error.to_string().contains("nowhere/sky.clouds.ron"), "{error}");
-    let cases: [(&str, &[&str]); 8] = [
+    let nine = format!("(\n  layers: [{}],\n)", "(), ".repeat(9));
+    let cases: [(&str, &[&str]); 16] = [
         ("(\n  model: (\n    colour: 1.0,\n  ),\n)", &["sky.ron:3:", "colour"]),
         ("(\n  model: (\n    coverage: \"much\",\n  ),\n)", &["sky.ron:3:"]),
         ("(\n  lighting: (octaves: -1),\n)", &["sky.ron:2:"]),
@@ -271,6 +345,20 @@ fn bad_presets_name_file_line_and_field() {
         ("(model: (coverage: 1.5))", &["sky.ron", "model.coverage", "1.5", "-1", "1"]),
         ("(model: (bottom: 3000.0, top: 2000.0))", &["sky.ron", "model.bottom", "model.top", "3000", "2000"]),
         ("(textures: (volume_size: 48))", &["sky.ron", "textures.volume_size", "48", "32", "256"]),
+        ("(\n  layers: [\n    (bass: 900.0),\n  ],\n)", &["sky.ron:3:6", "bass"]),
+        ("(\n  layers: [\n    (map: (\n      covr: 3.0)),\n  ],\n)", &["sky.ron:4:7", "covr"]),
+        ("(\n  layers: [\n    (thickness: \"tall\"),\n  ],\n)", &["sky.ron:3:"]),
+        ("(layers: [(), (map: (cover: 9))])", &["sky.ron: layers.1.map.cover = 9 is outside its range 0 to 8"]),
+        ("(layers: [(thickness: -500)])", &["sky.ron: layers.0.thickness = -500 is outside its range 10 to"]),
+        (
+            "(layers: [(), (far_start: 9000, far_end: 900)])",
+            &["sky.ron: layers.1.far_end = 900 must be above layers.1.far_start = 9000"],
+        ),
+        (
+            "(layers: [(map: (size: 100))])",
+            &["sky.ron: layers.0.map.size = 100 must be a power of two from 64 to 2048"],
+        ),
+        (&nine, &["sky.ron: layers holds 9 layers, and 8 is the most"]),
     ];
     for (text, named) in cases {
         let error = CloudPreset::parse(text, "sky.ron").expect_err(text).to_string();
@@ -312,6 +400,8 @@ fn the_readme_names_every_field() {
     let row = |name: &str| table.lines().find(|line| line.starts_with(&format!("| `{name}`"))).expect(name);
     let all = [
         CloudModel::type_info(),
+        CloudLayer::type_info(),
+        WeatherRecipe::type_info(),
         CloudLighting::type_info(),
         CloudQuality::type_info(),
         CloudTextures::type_info(),
@@ -320,7 +410,7 @@ fn the_readme_names_every_field() {
         CloudView::type_info(),
     ];
     for info in all {
-        let TypeInfo::Struct(info) = info else { panic!("{info:?} is no struct") };
+        let info = struct_info(info);
         let row = row(info.type_path_table().ident().expect("a name"));
         for field in info.field_names() {
             assert!(row.contains(&format!("`{field}`")), "{field} is not in {row}");

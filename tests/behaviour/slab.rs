@@ -370,13 +370,16 @@ fn the_model_knows_nothing_of_the_renderer() {
                     "medium",
                     "Medium",
                     "planet",
+                    "MOST_DECKS",
                     "model_bounds",
+                    "model_deck",
                     "density_bound",
                     "sample_medium",
                     "empty_medium",
                     "shell_intervals",
                     "shell_roots",
                     "altitude",
+                    "up_at",
                     "debug_value",
                 ];
                 assert!(known.contains(&name), "{path} imports {name} of the model");

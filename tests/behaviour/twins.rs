@@ -6,6 +6,7 @@
 use bevy::{
     app::App,
     math::{DVec2, DVec3, Vec3},
+    render::render_resource::{BindGroup, BindGroupLayoutDescriptor},
 };
 use bevy_cumulus::reference::{
     integrate::{mean_transmittance, step_energy_conserving, step_naive},
@@ -13,7 +14,7 @@ use bevy_cumulus::reference::{
 };
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
-use crate::gpu::{run_compute, shader_app};
+use crate::gpu::{run_compute_with, shader_app};
 
 /// Unit roundoff of f32.
 pub const U: f64 = 5.960_464_5e-8;
@@ -24,6 +25,17 @@ pub const R: f32 = PLANET_RADIUS as f32;
 /// Runs `body` for each item: it reads `values[i..]` (`N` floats) and writes `results[o..]` (`M` floats).
 pub fn on_gpu<const N: usize, const M: usize>(
     app: &mut App,
+    imports: &str,
+    body: &str,
+    inputs: &[[f32; N]],
+) -> Vec<[f32; M]> {
+    on_gpu_with(app, None, imports, body, inputs)
+}
+
+/// The same, with a bind group 1 of the caller's.
+pub fn on_gpu_with<const N: usize, const M: usize>(
+    app: &mut App,
+    group_1: Option<&(BindGroupLayoutDescriptor, BindGroup)>,
     imports: &str,
     body: &str,
     inputs: &[[f32; N]],
@@ -45,7 +57,7 @@ fn main(@builtin(global_invocation_id) id: vec3<u32>) {{
 "
     );
     let count = inputs.len();
-    let written = run_compute(app, &shader, inputs.as_flattened(), count * M, count as u32);
+    let written = run_compute_with(app, &shader, group_1, inputs.as_flattened(), count * M, count as u32);
     written.as_chunks().0.to_vec()
 }
 

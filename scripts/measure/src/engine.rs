@@ -1,10 +1,15 @@
 //! Drives the `headless` example: many pictures in one process, so that textures are baked once.
 
 use std::{
+    collections::hash_map::DefaultHasher,
     fs::{self, File},
+    hash::{Hash as _, Hasher as _},
     io::{BufRead as _, BufReader},
     path::{Path, PathBuf},
-    process::{Command, Stdio},
+    process::{Child, Command, Stdio},
+    sync::mpsc::{RecvTimeoutError, channel},
+    thread,
+    time::{Duration, Instant},
 };
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
@@ -21,6 +26,8 @@ pub struct Engine {
     pub out: PathBuf,
     /// The scenes' fields of view are divided by this.
     pub zoom: f64,
+    /// When to stop, to go on another time.
+    pub deadline: Option<Instant>,
 }
 
 /// One picture to be made.
@@ -95,12 +102,34 @@ impl Engine {
         self.out.join(scene)
     }
 
-    /// Renders jobs that share scene, size and textures, in this order.
+    /// Renders jobs that share scene, size and textures, in this order; those that a run which was cut off has done are kept.
     pub fn render(&self, scene: &str, size: &str, jobs: &[Job], progress: &Progress) -> Result<()> {
+        self.render_sharing("", scene, size, jobs, progress)
+    }
+
+    /// The same with options that all jobs share.
+    pub fn render_sharing(
+        &self,
+        shared: &str,
+        scene: &str,
+        size: &str,
+        jobs: &[Job],
+        progress: &Progress,
+    ) -> Result<()> {
         let folder = self.folder(scene);
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        let view = format!("{} {shared}", self.view(scene)?);
+        let stamps: Vec<String> = jobs.iter().map(|job| self.stamp(job, size, &view)).collect::<Result<_>>()?;
+        let is_done = |(job, stamp): &(&Job, &String)| {
+            fs::read_to_string(done_path(&folder, job)).is_ok_and(|found| found == **stamp)
+        };
+        let (done, left): (Vec<_>, Vec<_>) = jobs.iter().zip(&stamps).partition(is_done);
+        progress.skip(done.len());
+        if left.is_empty() {
+            return Ok(());
+        }
         let mut lines = String::new();
-        for Job { name, options, frames, picture } in jobs {
+        for (Job { name, options, frames, picture }, _) in &left {
             lines += &format!("{options} --frames {frames} --timings {name}.json");
             lines += &if *picture { format!(" --out {name}.png --cloud {name}.exr\n") } else { "\n".to_owned() };
         }
@@ -111,27 +140,53 @@ impl Engine {
         let mut child = Command::new(fs::canonicalize(&self.headless)?)
             .current_dir(&folder)
             .args(["--scene", scene, "--size", size, "--batch", "batch.txt"])
-            .args(self.view(scene)?.split_whitespace())
+            .args(view.split_whitespace())
             .stdin(Stdio::null())
             .stdout(Stdio::piped())
             .stderr(log)
             .spawn()
             .with_context(|| format!("cannot start {}", self.headless.display()))?;
-        let stdout = child.stdout.take().ok_or_else(|| anyhow!("headless has no stdout"))?;
-        let mut done = jobs.iter();
         // One line for each job that is done.
-        for line in BufReader::new(stdout).lines() {
-            line.context("headless")?;
-            if let Some(job) = done.next() {
-                progress.done(&format!("{scene}: {}", job.name));
-            }
-        }
+        let mut left = left.into_iter();
+        self.each_line(&mut child, || {
+            let Some((job, stamp)) = left.next() else { return Ok(()) };
+            fs::write(done_path(&folder, job), stamp)
+                .with_context(|| format!("cannot write to {}", folder.display()))?;
+            progress.done(&format!("{scene}: {}", job.name));
+            Ok(())
+        })?;
         if !child.wait().context("headless")?.success() {
             let log = fs::read_to_string(&log_path).unwrap_or_default();
             let tail: Vec<&str> = log.lines().rev().take(5).collect();
             bail!("headless failed in {}: {}", batch.display(), tail.into_iter().rev().collect::<Vec<_>>().join(" / "));
         }
         Ok(())
+    }
+
+    /// Calls `take` at each line that the child prints; ends it where the time is up.
+    fn each_line(&self, child: &mut Child, mut take: impl FnMut() -> Result<()>) -> Result<()> {
+        let stdout = child.stdout.take().ok_or_else(|| anyhow!("headless has no stdout"))?;
+        let (sender, lines) = channel();
+        thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|l| sender.send(l)));
+        loop {
+            let left = self.deadline.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()));
+            match lines.recv_timeout(left) {
+                Ok(_) => take()?,
+                Err(RecvTimeoutError::Disconnected) => return Ok(()),
+                Err(RecvTimeoutError::Timeout) => {
+                    child.kill().and_then(|()| child.wait()).context("cannot end headless")?;
+                    bail!("the time is up (--minutes); the same command goes on from here");
+                }
+            }
+        }
+    }
+
+    /// What a job's files follow from: they are those of another run only where all of it is the same.
+    fn stamp(&self, job: &Job, size: &str, view: &str) -> Result<String> {
+        let built = fs::metadata(&self.headless)?;
+        let mut hasher = DefaultHasher::new();
+        (built.len(), built.modified().ok(), job.frames, job.picture).hash(&mut hasher);
+        Ok(format!("{:016x} {size} {view} {}", hasher.finish(), job.options))
     }
 
     /// The picture that a job made.
@@ -143,6 +198,11 @@ impl Engine {
     pub fn cost(&self, scene: &str, job: &str) -> Result<Cost> {
         read_cost(&self.folder(scene).join(job).with_extension("json"))
     }
+}
+
+/// Says that a job's other files are whole.
+fn done_path(folder: &Path, job: &Job) -> PathBuf {
+    folder.join(&job.name).with_extension("done")
 }
 
 fn read_cost(path: &Path) -> Result<Cost> {
@@ -160,7 +220,7 @@ fn read_cost(path: &Path) -> Result<Cost> {
 }
 
 /// Whether a driver runs on the processor. It then shares it with whatever else runs, which only ever adds time: the
-/// quickest frame is nearest to the truth.
+/// quickest frame is nearest to the truth. (The processor's own time of a process was no steadier on a virtual machine.)
 pub fn is_software(adapter: &str) -> bool {
     let name = adapter.to_lowercase();
     ["llvmpipe", "lavapipe", "swiftshader"].iter().any(|known| name.contains(known))

@@ -4,6 +4,7 @@
 //! (`truth`) and write tables and plots. `scripts/fidelity`, `scripts/ladder` and
 //! `scripts/motion` build and start it.
 
+mod backdrop;
 mod engine;
 mod fidelity;
 mod ladder;
@@ -15,9 +16,15 @@ mod picture;
 mod plot;
 mod progress;
 mod sheet;
+mod smooth;
+mod taken;
 mod truth;
 
-use std::{path::PathBuf, process::ExitCode};
+use std::{
+    path::PathBuf,
+    process::ExitCode,
+    time::{Duration, Instant},
+};
 
 use anyhow::{Result, anyhow, bail};
 use clap::{Args, Parser, Subcommand};
@@ -82,6 +89,9 @@ struct Common {
     /// Make the references anew
     #[arg(long)]
     fresh: bool,
+    /// Stop after so many minutes; the same command then goes on from there
+    #[arg(long, value_name = "N")]
+    minutes: Option<f64>,
     /// Keep every picture and its timings
     #[arg(long)]
     keep: bool,
@@ -112,7 +122,10 @@ impl Common {
             bail!("--headless {}: there is no such file", self.headless.display());
         }
         let out = self.out.clone().unwrap_or_else(|| self.repository.join("target").join(name));
-        Ok(Engine { headless: self.headless.clone(), out, zoom })
+        let limit = self.minutes.map(|minutes| Duration::try_from_secs_f64(60.0 * minutes));
+        let limit = limit.transpose().map_err(|error| anyhow!("--minutes: {error}"))?;
+        let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
+        Ok(Engine { headless: self.headless.clone(), out, zoom, deadline })
     }
 
     fn recipe(&self, small: u32, full: u32) -> Result<Recipe> {

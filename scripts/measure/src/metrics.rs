@@ -7,7 +7,7 @@ use anyhow::{Result, ensure};
 use image::{RgbImage, Rgba32FImage};
 use serde_json::{Value, json};
 
-use crate::picture::Picture;
+use crate::{backdrop::Backdrop, picture::Picture, smooth::smoothed};
 
 /// A pixel counts as cloud where the truth's transmittance is below this.
 pub const CLOUD_BELOW: f32 = 0.98;
@@ -22,6 +22,8 @@ pub struct Truth {
     /// Luminance around each pixel (3×3, in cloud), squared, with the floor: what a squared error is divided by.
     scale: Vec<f64>,
     luminance: f64,
+    /// What test pictures are shown before; without one they are taken as the renderer shows them.
+    backdrop: Option<Backdrop>,
 }
 
 /// Errors of one picture. Means over the cloud's pixels unless said otherwise.
@@ -96,7 +98,29 @@ impl Truth {
         let count = mask.iter().filter(|m| **m).count().max(1);
         let floor = FLOOR * luminance / count as f64;
         let scale = around(&mean.cloud, &mask, &brightness).into_iter().map(|y| y * y + floor * floor).collect();
-        Ok(Self { halves: [a, b], mean, mask, scale, luminance })
+        Ok(Self { halves: [a, b], mean, mask, scale, luminance, backdrop: None })
+    }
+
+    /// Has the truth shown before a sky with little of its noise left: smoothed, but for the detail of `guide`, a picture
+    /// without noise. Everything but FLIP still goes by the halves as they are.
+    pub fn refined(mut self, backdrop: Backdrop, guide: &Rgba32FImage) -> Result<Self> {
+        ensure!(guide.dimensions() == self.mean.cloud.dimensions(), "guide and truth differ in size");
+        let [a, b] = &mut self.halves;
+        for picture in [a, b, &mut self.mean] {
+            picture.shown = backdrop.show(&smoothed(&picture.cloud, guide));
+        }
+        self.backdrop = Some(backdrop);
+        Ok(self)
+    }
+
+    /// How far a picture as shown here is from how the renderer shows it: mean over the pixels, in codes of 255.
+    pub fn apart_from_renderer(&self, picture: &Picture) -> Result<f64> {
+        self.backdrop.as_ref().map_or(Ok(0.0), |backdrop| backdrop.check(picture))
+    }
+
+    /// A test picture as it is shown to be held against this truth.
+    pub fn shown(&self, test: &Picture) -> RgbImage {
+        self.backdrop.as_ref().map_or_else(|| test.shown.clone(), |backdrop| backdrop.show(&test.cloud))
     }
 
     /// The best single picture of it.
@@ -120,7 +144,7 @@ impl Truth {
     pub fn judge(&self, test: &Picture) -> Result<(Errors, FlipMap)> {
         ensure!(test.cloud.dimensions() == self.mean.cloud.dimensions(), "picture and truth differ in size");
         ensure!(self.cover() > 0.0, "the truth shows no cloud");
-        let map = flip(&self.mean.shown, &test.shown)?;
+        let map = flip(&self.mean.shown, &self.shown(test))?;
         let [a, b] = &self.halves;
         let triples = || test.cloud.pixels().zip(a.cloud.pixels().zip(b.cloud.pixels()));
         let product = |t: f32, a: f32, b: f32| (f64::from(t) - f64::from(a)) * (f64::from(t) - f64::from(b));

@@ -43,12 +43,14 @@ impl Picture {
     }
 }
 
-fn decode(code: u8) -> f64 {
+/// Light of an sRGB code.
+pub fn decode(code: u8) -> f64 {
     let v = f64::from(code) / 255.0;
     if v <= 0.04045 { v / 12.92 } else { ((v + 0.055) / 1.055).powf(2.4) }
 }
 
-fn encode(v: f64) -> u8 {
+/// The sRGB code of linear light.
+pub fn encode(v: f64) -> u8 {
     let s = if v <= 0.003_130_8 { v * 12.92 } else { 1.055 * v.powf(1.0 / 2.4) - 0.055 };
     (s * 255.0).round().clamp(0.0, 255.0) as u8
 }

@@ -12,9 +12,11 @@ use serde_json::Value;
 
 use crate::{
     engine::{Engine, Job},
+    machine::Machine,
     metrics::Truth,
     picture::Picture,
     progress::Progress,
+    taken::Taken,
 };
 
 /// Sources that the path-traced picture follows from. What only the march reads is left out, so that tuning it keeps
@@ -66,6 +68,12 @@ impl Recipe {
         self.quality != "reference"
     }
 
+    /// What a report says of a run with it.
+    pub fn taken(&self, size: String, zoom: f64, machine: Machine, seconds: u64) -> Taken {
+        let stand_in = self.is_stand_in().then(|| self.quality.clone());
+        Taken { size, zoom, samples: self.samples, stand_in, machine, seconds }
+    }
+
     /// The truth of a scene; `more` are further options, such as another cut-off distance.
     pub fn make(&self, engine: &Engine, scene: &str, size: &str, more: &str, progress: &Progress) -> Result<Truth> {
         let options = format!("--quality {} {more}", self.quality);
@@ -77,6 +85,7 @@ impl Recipe {
         if have && !self.fresh {
             progress.skip(names.len());
         } else {
+            eprintln!("making {}", kept.display());
             self.render(engine, scene, size, &options, &kept, progress)?;
         }
         let [a, b] = names.map(|name| Picture::read(&kept.join(name)));

@@ -10,6 +10,7 @@ use bevy::{
 use crate::render::{FrameUniform, depth_layout, phase_tables_layout};
 
 pub(crate) fn add_shaders(app: &mut App) {
+    load_shader_library!(app, "luminance.wesl");
     load_shader_library!(app, "rng.wesl");
     load_shader_library!(app, "scatter.wesl");
     load_shader_library!(app, "events.wesl");

@@ -12,42 +12,25 @@ use bevy_cumulus::{
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use super::{field_app, sky, small};
-use crate::{
-    gpu::{run_compute_with, run_updates},
-    view::spawn_sun,
-};
+use crate::{gpu::run_updates, twins::on_gpu_with, view::spawn_sun};
 
 const STEPS: u32 = 4096;
 
 /// Optical depth of a segment from a to b by its midpoints.
 const MARCH: &str = "
-import bevy_cumulus::model::model::sample_medium;
-
-@group(0) @binding(0) var<storage, read> values: array<f32>;
-@group(0) @binding(1) var<storage, read_write> results: array<f32>;
-
-@compute @workgroup_size(64)
-fn main(@builtin(global_invocation_id) id: vec3<u32>) {
-    let i = id.x * 6u;
-    if i >= arrayLength(&values) {
-        return;
-    }
     let a = vec3<f32>(values[i], values[i + 1u], values[i + 2u]);
     let b = vec3<f32>(values[i + 3u], values[i + 4u], values[i + 5u]);
     var sum = 0.0;
     for (var k = 0u; k < STEPSu; k++) {
         sum += sample_medium(mix(a, b, (f32(k) + 0.5) / STEPS.0), 0.0).extinction;
     }
-    results[id.x] = sum * distance(a, b) / STEPS.0;
-}
-";
+    results[o] = sum * distance(a, b) / STEPS.0;";
 
 fn march_on_gpu(app: &mut App, camera: DVec3, segments: &[[f32; 6]]) -> Vec<f64> {
     let group = ModelShader::bindings(app, camera).expect("the model can be bound");
-    let shader = MARCH.replace("STEPS", &STEPS.to_string());
-    let count = segments.len();
-    let found = run_compute_with(app, &shader, Some(&group), segments.as_flattened(), count, count as u32);
-    found.into_iter().map(f64::from).collect()
+    let body = MARCH.replace("STEPS", &STEPS.to_string());
+    let found = on_gpu_with(app, Some(&group), "import bevy_cumulus::model::model::sample_medium;", &body, segments);
+    found.into_iter().map(|[depth]| f64::from(depth)).collect()
 }
 
 /// Somewhere in the middle of the clouds.

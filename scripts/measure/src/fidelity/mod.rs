@@ -12,21 +12,25 @@ use serde_json::{Value, json};
 
 use crate::{
     Common,
+    backdrop::Backdrop,
     engine::{Cost, Engine, Job, is_software},
     machine::Machine,
     metrics::{Errors, Truth},
+    picture::Picture,
     progress::Progress,
     sheet,
+    taken::Taken,
 };
+pub use rows::converged;
 use rows::{CONVERGED, Group, HIGH, Row};
 
-const SCENES: [&str; 5] = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills"];
+const SCENES: [&str; 6] = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills", "above"];
 const SMALL_SIZE: &str = "128x72";
 /// Samples of a reference, both halves together.
 const SAMPLES: u32 = 128;
 const FULL_SAMPLES: u32 = 4096;
 /// Frames of a job that only measures High's cost again, and rows between two of them: machines speed up and slow down.
-const HIGH_AGAIN_FRAMES: u32 = 4;
+const HIGH_AGAIN_FRAMES: u32 = 6;
 const HIGH_AGAIN_EVERY: usize = 3;
 
 #[derive(Args)]
@@ -58,23 +62,19 @@ struct SceneResult {
     scene: String,
     /// Share of the picture that is cloud.
     cover: f64,
-    /// FLIP between the reference's halves.
+    /// FLIP between the reference's halves, smoothed.
     noise: f64,
+    /// How far pictures as shown here are from the renderer's own (codes of 255).
+    apart: f64,
     /// One for each row.
     found: Vec<Found>,
 }
 
 /// All that a report is written from.
 struct Results {
-    size: String,
-    zoom: f64,
-    samples: u32,
-    /// What stands for the reference, where it is not the path tracer.
-    stand_in: Option<String>,
+    taken: Taken,
     rows: Vec<Row>,
     scenes: Vec<SceneResult>,
-    machine: Machine,
-    seconds: u64,
 }
 
 pub fn run(options: &Options) -> Result<()> {
@@ -90,29 +90,23 @@ pub fn run(options: &Options) -> Result<()> {
     let scenes: Vec<String> =
         if options.scenes.is_empty() { SCENES.map(str::to_owned).to_vec() } else { options.scenes.clone() };
     let jobs = jobs(&engine, &rows)?;
-    let progress = Progress::begin(scenes.len() * (jobs.len() + 2));
+    let progress = Progress::begin(scenes.len() * (jobs.len() + 2 + Backdrop::PICTURES));
     let mut results = Vec::new();
     for scene in &scenes {
         let truth = recipe.make(&engine, scene, &size, "", &progress)?;
+        let backdrop = Backdrop::of(&engine, scene, &size, &progress)?;
         engine.render(scene, &size, &jobs, &progress)?;
+        let truth = truth.refined(backdrop, &engine.picture(scene, CONVERGED)?.cloud)?;
         results.push(judge(&engine, scene, &rows, &jobs, &truth)?);
-        if !common.keep {
-            remove_pictures(&engine, scene)?;
-        }
     }
     let adapter = results.first().and_then(|r| r.found.first()).map(|f| f.cost.adapter.clone()).unwrap_or_default();
     let whole = options.scenes.is_empty() && options.only.is_empty() && !recipe.is_stand_in();
-    let results = Results {
-        size,
-        zoom: engine.zoom,
-        samples: recipe.samples,
-        stand_in: recipe.is_stand_in().then(|| recipe.quality.clone()),
-        rows,
-        scenes: results,
-        machine: Machine::this(&adapter),
-        seconds: progress.seconds(),
-    };
+    let taken = recipe.taken(size, engine.zoom, Machine::this(&adapter), progress.seconds());
+    let results = Results { taken, rows, scenes: results };
     drop(progress);
+    if !common.keep {
+        scenes.iter().try_for_each(|scene| remove_pictures(&engine, scene))?;
+    }
     let json_path = engine.out.join("fidelity.json");
     fs::write(&json_path, serde_json::to_string_pretty(&results.to_json())?)
         .with_context(|| format!("cannot write {}", json_path.display()))?;
@@ -159,23 +153,25 @@ fn cost_ratio(engine: &Engine, scene: &str, jobs: &[Job], name: &str) -> Result<
         let around = [jobs[..at].iter().rev().find(is_high), jobs[at..].iter().find(is_high)];
         around.into_iter().flatten().collect()
     };
-    let costs: Vec<Option<f64>> =
-        near.iter().map(|job| Ok(engine.cost(scene, &job.name)?.total())).collect::<Result<_>>()?;
-    let Some(costs) = costs.into_iter().collect::<Option<Vec<f64>>>() else { return Ok(None) };
+    let high = near.iter().map(|job| Ok(engine.cost(scene, &job.name)?.total()));
+    let Some(high) = high.collect::<Result<Option<Vec<f64>>>>()? else { return Ok(None) };
     let high = if is_software(&own.adapter) {
-        costs.iter().copied().reduce(f64::min)
+        high.iter().copied().reduce(f64::min)
     } else {
-        Some(costs.iter().sum::<f64>() / costs.len() as f64)
+        Some(high.iter().sum::<f64>() / high.len() as f64)
     };
     Ok(own.total().zip(high).map(|(own, high)| own / high))
 }
 
 fn judge(engine: &Engine, scene: &str, rows: &[Row], jobs: &[Job], truth: &Truth) -> Result<SceneResult> {
-    let converged = Truth::exact(engine.picture(scene, CONVERGED)?)?;
+    let converged = engine.picture(scene, CONVERGED)?;
+    let apart = truth.apart_from_renderer(&converged)?;
+    let converged = Truth::exact(Picture { shown: truth.shown(&converged), ..converged })?;
     let mut found = Vec::new();
     let mut sheet_rows = Vec::new();
     for row in rows {
-        let picture = engine.picture(scene, row.name)?;
+        let mut picture = engine.picture(scene, row.name)?;
+        picture.shown = truth.shown(&picture);
         let (to_truth, map) = truth.judge(&picture).with_context(|| format!("{scene}: {}", row.name))?;
         let (to_converged, _) = converged.judge(&picture).with_context(|| format!("{scene}: {}", row.name))?;
         let cost = engine.cost(scene, row.name)?;
@@ -188,7 +184,7 @@ fn judge(engine: &Engine, scene: &str, rows: &[Row], jobs: &[Job], truth: &Truth
         }
     }
     sheet::write(&engine.out.join(scene).with_extension("png"), &sheet_rows)?;
-    Ok(SceneResult { scene: scene.to_owned(), cover: truth.cover(), noise: truth.noise()?, found })
+    Ok(SceneResult { scene: scene.to_owned(), cover: truth.cover(), noise: truth.noise()?, apart, found })
 }
 
 fn remove_pictures(engine: &Engine, scene: &str) -> Result<()> {
@@ -222,10 +218,11 @@ impl Results {
                     "to_converged": found.to_converged.to_json(), "cost_ratio": found.ratio });
                 (row.name.to_owned(), all)
             });
-            json!({ "cover": scene.cover, "noise": scene.noise, "rows": rows.collect::<Value>() })
+            json!({ "cover": scene.cover, "noise": scene.noise, "apart": scene.apart, "rows": rows.collect::<Value>() })
         };
         let scenes: Value = self.scenes.iter().map(|scene| (scene.scene.clone(), found(scene))).collect();
-        json!({ "size": self.size, "zoom": self.zoom, "samples": self.samples, "stand_in": self.stand_in, "date": self.machine.date,
-            "adapter": self.machine.adapter, "commit": self.machine.commit, "scenes": scenes })
+        let Taken { size, zoom, samples, stand_in, machine, .. } = &self.taken;
+        json!({ "size": size, "zoom": zoom, "samples": samples, "stand_in": stand_in, "date": machine.date,
+            "adapter": machine.adapter, "commit": machine.commit, "scenes": scenes })
     }
 }

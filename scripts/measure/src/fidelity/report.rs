@@ -4,8 +4,9 @@ use std::fmt::Write as _;
 
 use super::{Errors, Found, HIGH, Results, rows::Group};
 use crate::{
-    markdown::{maybe, number, table, zoomed},
+    markdown::{maybe, number, table},
     metrics::{CLOUD_BELOW, FLOOR},
+    smooth::RADIUS,
 };
 
 /// What the default preset is to reach, and where (issue 4).
@@ -19,6 +20,9 @@ A real-time cloud is a stack of approximations. Here each preset, and each appro
 tracer that makes none of them (`CloudQuality::reference()`), and against our own march with steps so short that only the
 model of light is left to differ. Written by `scripts/fidelity`; edit that, not this file.
 ";
+
+/// What was changed because of these tables, kept by hand.
+const HISTORY: &str = include_str!("history.md");
 
 const COLUMNS: &str = "## How to read the tables
 
@@ -36,9 +40,15 @@ transmittance in the reference is below CLOUD_BELOW.
 
 **Noise.** A path-traced picture of few samples is noisy. Radiance and transmittance are therefore held against two halves A
 and B of independent samples: `(x − A)(x − B)` has the mean `(x − truth)²`, so the reference's noise adds nothing to relMSE
-and T error on average (a small one may come out slightly negative). FLIP cannot be freed of noise like that; it is taken
-against the mean of the halves, and the noise floor below (FLIP between the halves) says what part of it may be noise: even
-a perfect picture would score roughly half of it.
+and T error on average (a small one may come out slightly negative).
+
+FLIP compares pictures as shown, and tone mapping bends: a noisy picture is shown too dark, in the colour of its most frequent
+samples. For FLIP the halves are therefore averaged as light, before tone mapping, and over some 50 pixels: the difference
+from our converged march, per opacity, is smoothed (a Gaussian of RADIUS pixels) and added to the march again. What march and
+reference differ in within a few pixels is thus not in FLIP, but in relMSE and T error, which go by the halves as they are.
+Before the sky, clouds are then shown by this tool, exposed and tone-mapped as Bevy does it; so is every picture that is
+compared. The noise floor below is FLIP between the two halves so treated: a perfect picture would score about half of it, and
+less of it is left beside a larger error, since the two add like squares.
 
 Errors depend on how fine the pixels are: noise is filtered over a pixel, so coarse ones lose the thin parts of clouds. Compare
 figures of one size and zoom only. With zoom, a small picture shows the middle of a view with the pixels of a larger one.
@@ -47,15 +57,14 @@ figures of one size and zoom only. With zoom, a small picture shows the middle o
 /// The report.
 pub fn write(results: &Results) -> String {
     let mut text = HEAD.to_owned();
-    if let Some(name) = &results.stand_in {
-        text += &format!("\n**Not the real thing: preset `{name}` stands in for the path tracer in this run.**\n");
-    }
+    text += &results.taken.warning();
     text += &targets(results);
-    text += &measured_on(results);
+    text += &results.taken.measured("");
     text += "\n";
     text += &COLUMNS
         .replace("CLOUD_BELOW", &number(f64::from(CLOUD_BELOW)))
-        .replace("FLOOR", &format!("{} %", number(FLOOR * 100.0)));
+        .replace("FLOOR", &format!("{} %", number(FLOOR * 100.0)))
+        .replace("RADIUS", &RADIUS.to_string());
     text += &noise(results);
     text += &presets(results);
     text += &passes(results);
@@ -63,6 +72,8 @@ pub fn write(results: &Results) -> String {
     for scene in 0..results.scenes.len() {
         text += &one_scene(results, scene);
     }
+    text += "\n";
+    text += HISTORY;
     text += &settings(results);
     text
 }
@@ -89,31 +100,19 @@ fn targets(results: &Results) -> String {
     text
 }
 
-fn measured_on(results: &Results) -> String {
-    let machine = &results.machine;
-    format!(
-        "\nMeasured {} at commit {} on {}, {}: pictures of {}{}, {} samples a pixel in each reference, {} min {} s in all. {}\n",
-        machine.date,
-        machine.commit,
-        machine.adapter,
-        machine.processor,
-        results.size,
-        zoomed(results.zoom),
-        results.samples,
-        results.seconds / 60,
-        results.seconds % 60,
-        machine.about_times(),
-    )
-}
-
 fn noise(results: &Results) -> String {
     let rows: Vec<_> = results
         .scenes
         .iter()
-        .map(|s| vec![s.scene.clone(), format!("{:.0} %", s.cover * 100.0), number(s.noise)])
+        .map(|s| vec![s.scene.clone(), format!("{:.0} %", s.cover * 100.0), number(s.noise), number(s.apart)])
         .collect();
-    let scenes = table(&["scene", "cloud in the picture", "noise floor (FLIP between halves)"], &rows);
-    format!("\n### Noise floor\n\n{scenes}")
+    let head = [
+        "scene",
+        "cloud in the picture",
+        "noise floor (FLIP between halves)",
+        "shown here and by the renderer, apart by (codes of 255)",
+    ];
+    format!("\n### Noise floor\n\n{}", table(&head, &rows))
 }
 
 /// The columns of errors.

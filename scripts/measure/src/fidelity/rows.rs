@@ -90,7 +90,7 @@ const FROM_HIGH: [Change; 4] = [
 pub fn all() -> Vec<Row> {
     let change =
         |group, base: &str, (name, label, settings): Change| Row { group, name, label, options: with(base, settings) };
-    let converged = with("--quality ultra", CONVERGED_SETTINGS);
+    let converged = converged();
     let presets = PRESETS.into_iter().map(|(name, label)| Row {
         group: Group::Preset,
         name,
@@ -102,6 +102,11 @@ pub fn all() -> Vec<Row> {
         .chain(ALONE.into_iter().map(|row| change(Group::Alone, &converged, row)))
         .chain(FROM_HIGH.into_iter().map(|row| change(Group::FromHigh, "--quality high", row)))
         .collect()
+}
+
+/// Options of the converged march.
+pub fn converged() -> String {
+    with("--quality ultra", CONVERGED_SETTINGS)
 }
 
 /// The rows asked for, with those that others are measured by.

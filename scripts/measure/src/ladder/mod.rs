@@ -11,11 +11,16 @@ use clap::Args;
 
 use crate::{
     Common,
+    backdrop::Backdrop,
     engine::{Cost, Engine, Job, is_software, median},
+    fidelity,
     machine::Machine,
     metrics::{Errors, Truth},
+    picture::Picture,
     progress::Progress,
     sheet,
+    taken::Taken,
+    truth::Recipe,
 };
 use rungs::{DISTANCE, HIGH, RUNGS};
 use studies::Study;
@@ -54,15 +59,10 @@ struct Step {
 }
 
 struct Results {
-    size: String,
-    zoom: f64,
-    samples: u32,
-    stand_in: Option<String>,
+    taken: Taken,
     noise: Option<f64>,
     steps: Vec<Step>,
     studies: Vec<Study>,
-    machine: Machine,
-    seconds: u64,
     /// Of the plots, as the report links to them.
     pictures: String,
 }
@@ -77,14 +77,14 @@ pub fn run(options: &Options) -> Result<()> {
     let engine = common.engine("ladder")?;
     let recipe = common.recipe(SAMPLES, FULL_SAMPLES)?;
     let size = common.size(SMALL_SIZE);
-    let rungs_count = if wanted(LADDER) { (RUNGS.len() + 1) * ROUNDS + 2 } else { 0 };
+    let rungs_count = if wanted(LADDER) { (RUNGS.len() + 1) * ROUNDS + 3 + Backdrop::PICTURES } else { 0 };
     let studies_count: usize =
         studies::NAMES.iter().filter(|n| wanted(n)).map(|n| studies::count(n, common.full)).sum();
     let progress = Progress::begin(rungs_count + studies_count);
 
     let (mut steps, mut noise) = (Vec::new(), None);
     if wanted(LADDER) {
-        let truth = recipe.make(&engine, SCENE, &size, DISTANCE, &progress)?;
+        let truth = truth(&engine, &recipe, &size, &progress)?;
         noise = Some(truth.noise()?);
         steps = climb(&engine, &size, &truth, &progress)?;
     }
@@ -93,26 +93,18 @@ pub fn run(options: &Options) -> Result<()> {
         measured.push(studies::measure(&engine, name, &size, common.full, &progress)?);
     }
 
+    // The first of what was measured tells the device.
     let any_job = if wanted(LADDER) { job_name(0, 0) } else { format!("{}_0_0", options.only[0]) };
     let machine = Machine::this(&engine.cost(SCENE, &any_job)?.adapter);
-    if !common.keep {
-        let folder = engine.folder(SCENE);
-        fs::remove_dir_all(&folder).with_context(|| format!("cannot remove {}", folder.display()))?;
-    }
     let whole = options.only.is_empty() && !recipe.is_stand_in();
     let report_path = common.report(&engine, "LADDER.md", whole);
     let pictures = if whole { "docs/pictures/ladder" } else { "plots" };
     let plots = report_path.parent().unwrap_or(&engine.out).join(pictures);
     let results = Results {
-        size,
-        zoom: engine.zoom,
-        samples: recipe.samples,
-        stand_in: recipe.is_stand_in().then(|| recipe.quality.clone()),
+        taken: recipe.taken(size, engine.zoom, machine, progress.seconds()),
         noise,
         steps,
         studies: measured,
-        machine,
-        seconds: progress.seconds(),
         pictures: pictures.to_owned(),
     };
     drop(progress);
@@ -120,8 +112,22 @@ pub fn run(options: &Options) -> Result<()> {
     report::plot(&results, &plots)?;
     fs::write(&report_path, report::write(&results))
         .with_context(|| format!("cannot write {}", report_path.display()))?;
+    if !common.keep {
+        let folder = engine.folder(SCENE);
+        fs::remove_dir_all(&folder).with_context(|| format!("cannot remove {}", folder.display()))?;
+    }
     println!("{}\n{}", report_path.display(), plots.display());
     Ok(())
+}
+
+/// The reference, cut off where the rungs are.
+fn truth(engine: &Engine, recipe: &Recipe, size: &str, progress: &Progress) -> Result<Truth> {
+    let noisy = recipe.make(engine, SCENE, size, DISTANCE, progress)?;
+    let backdrop = Backdrop::of(engine, SCENE, size, progress)?;
+    let options = format!("{} {DISTANCE}", fidelity::converged());
+    let job = Job { name: "converged".into(), frames: engine.frames(&options)?, options, picture: true };
+    engine.render(SCENE, size, &[job], progress)?;
+    noisy.refined(backdrop, &engine.picture(SCENE, "converged")?.cloud)
 }
 
 fn job_name(rung: usize, round: usize) -> String {
@@ -142,12 +148,16 @@ fn climb(engine: &Engine, size: &str, truth: &Truth, progress: &Progress) -> Res
     }
     engine.render(SCENE, size, &jobs, progress)?;
 
-    let first = Truth::exact(engine.picture(SCENE, &job_name(0, 0))?)?;
+    let seen = |rung: usize| -> Result<Picture> {
+        let picture = engine.picture(SCENE, &job_name(rung, 0))?;
+        Ok(Picture { shown: truth.shown(&picture), ..picture })
+    };
+    let first = Truth::exact(seen(0)?)?;
     let mut steps = Vec::new();
     let mut sheet_rows = Vec::new();
     let mut before: Option<Vec<Cost>> = None;
     for (n, (rung, options)) in all.iter().enumerate() {
-        let picture = engine.picture(SCENE, &job_name(n, 0))?;
+        let picture = seen(n)?;
         let costs: Vec<Cost> =
             (0..ROUNDS).map(|round| engine.cost(SCENE, &job_name(n, round))).collect::<Result<_>>()?;
         // High builds on no rung.

@@ -6,7 +6,7 @@ use anyhow::Result;
 
 use super::{Results, Step, studies::Study};
 use crate::{
-    markdown::{maybe, number, table, zoomed},
+    markdown::{maybe, number, table},
     plot::{Plot, Series},
 };
 
@@ -51,25 +51,8 @@ const WHY: &str = "
 
 pub fn write(results: &Results) -> String {
     let mut text = HEAD.to_owned();
-    if let Some(name) = &results.stand_in {
-        text += &format!("\n**Not the real thing: preset `{name}` stands in for the path tracer in this run.**\n");
-    }
-    let machine = &results.machine;
-    text += &format!(
-        "\nMeasured {} at commit {} on {}, {}: pictures of {}{}, scene {}, {} samples a pixel in the reference, {} min {} s in
-all. {}\n",
-        machine.date,
-        machine.commit,
-        machine.adapter,
-        machine.processor,
-        results.size,
-        zoomed(results.zoom),
-        super::SCENE,
-        results.samples,
-        results.seconds / 60,
-        results.seconds % 60,
-        machine.about_times(),
-    );
+    text += &results.taken.warning();
+    text += &results.taken.measured(&format!(", scene {}", super::SCENE));
     if !results.steps.is_empty() {
         text += &ladder(results);
     }

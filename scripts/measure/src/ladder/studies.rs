@@ -38,6 +38,8 @@ struct Ask {
     x: f64,
     label: String,
     size: String,
+    /// Options of the whole run that it is rendered in.
+    shared: String,
     options: String,
 }
 
@@ -51,7 +53,7 @@ const LIGHT_REACH: f64 = 1000.0;
 
 /// Texels along a side of the noise volumes.
 const NOISE: [u32; 4] = [32, 64, 128, 256];
-const SCREENS: [&str; 5] = ["64x36", "128x72", "256x144", "384x216", "640x360"];
+const SCREENS: [&str; 6] = ["64x36", "96x54", "128x72", "192x108", "256x144", "384x216"];
 /// Costa's table 12.
 const FULL_SCREENS: [&str; 13] = [
     "320x240",
@@ -86,7 +88,13 @@ pub const NAMES: [&str; 4] = ["eye", "light", "noise", "screen"];
 
 /// Title, axis and lines of a study; its points are yet to be measured.
 fn plan(name: &str, size: &str, full: bool) -> Option<(&'static str, &'static str, Vec<(String, Vec<Ask>)>)> {
-    let ask = |x: f64, options: String| Ask { x, label: x.to_string(), size: size.to_owned(), options };
+    let ask = |x: f64, options: String| Ask {
+        x,
+        label: x.to_string(),
+        size: size.to_owned(),
+        shared: String::new(),
+        options,
+    };
     Some(match name {
         "eye" => {
             let line = |light: f64| {
@@ -103,7 +111,10 @@ fn plan(name: &str, size: &str, full: bool) -> Option<(&'static str, &'static st
             ("Light steps", "light steps", vec![line(32.0), line(64.0)])
         }
         "noise" => {
-            let asks = NOISE.map(|side| ask(side.into(), format!("--quality high --set textures.volume_size={side}")));
+            let asks = NOISE.map(|side| Ask {
+                shared: format!("--set textures.volume_size={side}"),
+                ..ask(side.into(), "--quality high".to_owned())
+            });
             ("Noise size", "texels along a side of the noise volumes", vec![("High".into(), asks.into())])
         }
         "screen" => {
@@ -113,6 +124,7 @@ fn plan(name: &str, size: &str, full: bool) -> Option<(&'static str, &'static st
                     x: pixels(size),
                     label: (*size).to_owned(),
                     size: (*size).to_owned(),
+                    shared: String::new(),
                     options: format!("--quality {quality}"),
                 };
                 (quality.to_owned(), sizes.iter().map(at).collect())
@@ -131,26 +143,27 @@ pub fn count(name: &str, full: bool) -> usize {
 /// Renders a study.
 pub fn measure(engine: &Engine, name: &'static str, size: &str, full: bool, progress: &Progress) -> Result<Study> {
     let (title, x, lines) = plan(name, size, full).ok_or_else(|| anyhow!("there is no study {name}"))?;
+    // Pictures of unlike sizes cannot be compared: only the time counts.
+    let same_size = name != "screen";
     let job = |line: usize, point: usize, ask: &Ask| -> Result<Job> {
-        let frames = engine.frames(&ask.options)?;
-        Ok(Job { name: format!("{name}_{line}_{point}"), options: ask.options.clone(), frames, picture: true })
+        let frames = if same_size { engine.frames(&ask.options)? } else { super::TIMED_FRAMES };
+        let name = format!("{name}_{line}_{point}");
+        Ok(Job { name, options: ask.options.clone(), frames, picture: same_size })
     };
-    // One process for those that share size and textures, so that neighbours can be compared.
-    let mut batches: Vec<(String, Vec<Job>)> = Vec::new();
+    // One process for those that share size and textures.
+    let mut batches: Vec<(&str, &str, Vec<Job>)> = Vec::new();
     for (i, (_, asks)) in lines.iter().enumerate() {
         for (k, ask) in asks.iter().enumerate() {
             let job = job(i, k, ask)?;
-            let found = batches.iter_mut().find(|(size, _)| *size == ask.size && name != "noise");
-            match found {
-                Some((_, jobs)) => jobs.push(job),
-                None => batches.push((ask.size.clone(), vec![job])),
+            match batches.iter_mut().find(|(size, shared, _)| *size == ask.size && *shared == ask.shared) {
+                Some((_, _, jobs)) => jobs.push(job),
+                None => batches.push((&ask.size, &ask.shared, vec![job])),
             }
         }
     }
-    for (size, jobs) in &batches {
-        engine.render(super::SCENE, size, jobs, progress)?;
+    for (size, shared, jobs) in &batches {
+        engine.render_sharing(shared, super::SCENE, size, jobs, progress)?;
     }
-    let same_size = name != "screen";
     let mut measured = Vec::new();
     for (i, (line_name, asks)) in lines.into_iter().enumerate() {
         let last = format!("{name}_{i}_{}", asks.len() - 1);
@@ -158,9 +171,9 @@ pub fn measure(engine: &Engine, name: &'static str, size: &str, full: bool, prog
         let mut points = Vec::new();
         for (k, ask) in asks.into_iter().enumerate() {
             let job = format!("{name}_{i}_{k}");
-            let picture = engine.picture(super::SCENE, &job)?;
             let flip =
-                finest.as_ref().map(|finest| Ok::<_, anyhow::Error>(finest.judge(&picture)?.0.flip)).transpose()?;
+                |finest: &Truth| -> Result<f64> { Ok(finest.judge(&engine.picture(super::SCENE, &job)?)?.0.flip) };
+            let flip = finest.as_ref().map(flip).transpose()?;
             points.push(Point { x: ask.x, label: ask.label, march: engine.cost(super::SCENE, &job)?.march(), flip });
         }
         measured.push(Line { name: line_name, points });

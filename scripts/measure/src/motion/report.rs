@@ -22,7 +22,7 @@ const COLUMNS: &str = "
 pub fn write(results: &Results) -> String {
     let machine = &results.machine;
     let mut text = format!(
-        "{HEAD}\nMeasured {} at commit {} on {}, {}: pictures of {}{}, preset High, 60 frames a second, {FRAMES} frames of \
+        "{HEAD}\nMeasured {} at commit {} on {}, {}: pictures of {}{}, preset High, {}60 frames a second, {FRAMES} frames of \
          motion, {STILLS} frames for flicker, {} min {} s in all. {}\n\nTarget: moving at most {TARGET} above rest. \n{COLUMNS}",
         machine.date,
         machine.commit,
@@ -30,6 +30,7 @@ pub fn write(results: &Results) -> String {
         machine.processor,
         results.size,
         zoomed(results.zoom),
+        if results.sky { "" } else { "over a plain sky in place of Bevy's, " },
         results.seconds / 60,
         results.seconds % 60,
         machine.about_times(),

@@ -1,0 +1,63 @@
+//! A model of one's own: taken, refused with its line, and taken again.
+
+use bevy::prelude::*;
+use bevy_cumulus::{CloudStatus, ModelShader, ModelShaderError};
+
+use crate::{
+    gpu::{assert_shaders_compile, run_updates, times_logged},
+    stage::{linear_pixels, settle, slab, slab_app, spawn_linear},
+    view::until_drawn,
+};
+
+#[derive(Resource, Default)]
+struct Heard(Vec<ModelShaderError>);
+
+fn hear(mut errors: MessageReader<ModelShaderError>, mut heard: ResMut<Heard>) {
+    heard.0.extend(errors.read().cloned());
+}
+
+#[test]
+fn a_model_that_does_not_compile_leaves_the_last_good_one() {
+    let mut app = slab_app(1500.0, 2500.0, 0.0006);
+    app.init_resource::<Heard>().add_systems(Update, hear);
+    let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()));
+    let view = spawn_linear(&mut app, UVec2::new(12, 8), up);
+    until_drawn(&mut app);
+    settle(&mut app);
+    let picture = linear_pixels(&app, &view);
+    let good = slab(1500.0, 2500.0, 0.0006).0;
+    // A type, a name, and a sign that is missing: on lines of their own.
+    for (spoilt, line) in [
+        (good.replace("return 1.0;", "\n\nreturn 1u;"), 5),
+        (good.replace("return empty_medium();", "\nreturn nothing_7391();"), 7),
+        (good.replace("return vec2(", "\nreturn vec2(("), 4),
+    ] {
+        assert_ne!(spoilt, good);
+        let says = format!("the model does not compile, line {line}: ");
+        let (logged, heard) = (times_logged(&says), app.world().resource::<Heard>().0.len());
+        app.insert_resource(ModelShader(spoilt.clone()));
+        run_updates(&mut app, 6);
+        assert!(linear_pixels(&app, &view) == picture, "the clouds change: {spoilt}");
+        assert!(app.world().resource::<CloudStatus>().is_ready());
+        assert_shaders_compile(&app);
+        assert_eq!(
+            times_logged(&says),
+            logged + 1,
+            "{says:?} is not reported once: {:?}",
+            app.world().resource::<Heard>().0
+        );
+        let told = &app.world().resource::<Heard>().0[heard..];
+        assert!(told.len() == 1 && told[0].line == Some(line), "{told:?}");
+    }
+    // A good one is taken again, and the first of them, too.
+    app.insert_resource(slab(1500.0, 2500.0, 0.003));
+    settle(&mut app);
+    until_drawn(&mut app);
+    settle(&mut app);
+    assert!(linear_pixels(&app, &view) != picture, "a good model is not taken after a bad one");
+    app.insert_resource(ModelShader(good));
+    settle(&mut app);
+    until_drawn(&mut app);
+    settle(&mut app);
+    assert!(linear_pixels(&app, &view) == picture);
+}
