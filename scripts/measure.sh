@@ -10,6 +10,7 @@ measure_options="  --no-install     install nothing; where something is missing,
   --only A,B       only these parts; the report then goes to the output folder
   --out DIR        where results go
   --report FILE    the report, if not in its usual place
+  --minutes N      stop after so many minutes; the same command then goes on from there
   --keep           keep every picture and its timings there
   --fresh          make the references anew, though nothing that they depend on has changed
   --truth-quality NAME  a quality preset in the path tracer's stead, to work on this script; the report goes to the

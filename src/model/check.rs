@@ -118,8 +118,9 @@ fn validate(source: &str, composed: &str) -> Verdict {
     let module = match wgsl::Frontend::new().parse(composed) {
         Ok(module) => module,
         Err(error) => {
-            let at = error.location(composed).map(|at| at.offset as usize);
-            return blame(source, composed, at, error.message().to_owned());
+            // The first place that it knows: some errors begin with one that they do not.
+            let at = error.labels().filter_map(|(span, _)| span.to_range()).find(|range| !range.is_empty());
+            return blame(source, composed, at.map(|range| range.start), error.message().to_owned());
         }
     };
     match Validator::new(ValidationFlags::all(), Capabilities::all()).validate(&module) {
@@ -140,6 +141,8 @@ fn chain(error: &dyn std::error::Error) -> String {
 
 /// The error, at the source's line from which the composed text has what is there.
 fn blame(source: &str, composed: &str, at: Option<usize>, reason: String) -> Verdict {
+    // As the composer lengthens names.
+    let reason = reason.replace("_1bevy_cumulus_model_model_", "").replace("_1bevy_cumulus_model_medium_", "");
     let Some(at) = at else { return bad(None, reason) };
     if let Some(line) = lines::in_source(source, composed, at) {
         return bad(Some(line), reason);

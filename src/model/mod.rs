@@ -15,6 +15,7 @@ mod zone_at;
 use bevy::{prelude::*, shader::load_shader_library};
 
 pub(crate) use bindings::ModelBindings;
+pub(crate) use layers::decks;
 pub(crate) use layers::{MAX_ZONES, ZoneUniform};
 pub(crate) use space::TangentFrame;
 pub(crate) use uniform::{ModelSettings, ModelUniform, TexelSizes};

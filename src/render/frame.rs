@@ -107,7 +107,7 @@ impl FrameUniform {
             ),
             diffusion: diffusion(lighting),
             ambient: (lighting.ambient_tint * lighting.ambient_strength).extend(lighting.powder),
-            ground_albedo: lighting.ground_albedo.extend(0.0),
+            ground_albedo: lighting.ground_albedo.extend(lighting.ambient_desaturation),
             sky_fallback: lighting.sky_fallback.extend(0.0),
             steps: Vec4::new(quality.step, quality.step_growth, quality.light_step, quality.light_growth),
             limits: Vec4::new(

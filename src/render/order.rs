@@ -27,7 +27,10 @@ use super::{
     bind_groups::CloudBindGroups,
     view::{ExtractedCloudView, ExtractedClouds, planet},
 };
-use crate::settings::{CloudModel, CloudOrder};
+use crate::{
+    model::decks,
+    settings::{CloudOrder, CloudSettings},
+};
 
 /// Draws the view's clouds, once they can be.
 pub(crate) struct DrawClouds;
@@ -66,10 +69,12 @@ struct Layer {
 }
 
 impl Layer {
-    fn new(model: &CloudModel, atmosphere: Option<&ExtractedAtmosphere>) -> Self {
+    /// The lowest deck: things above it are seen through it, and through thin cloud higher up as well.
+    fn new(settings: &CloudSettings, atmosphere: Option<&ExtractedAtmosphere>) -> Self {
         let (centre, radius) = planet(atmosphere);
-        let [bottom, top] = [model.bottom, model.top].map(f64::from);
-        Self { centre: centre - model.world_offset, radius, bottom, top }
+        let decks = decks(&settings.model, settings.layers.shown().map(|(_, layer)| layer));
+        let [bottom, top] = decks.first().copied().unwrap_or_default().to_array().map(f64::from);
+        Self { centre: centre - settings.model.world_offset, radius, bottom, top }
     }
 
     fn altitude(&self, place: Vec3) -> f64 {
@@ -107,7 +112,7 @@ pub(crate) fn sort_in(
             extra_index: PhaseItemExtraIndex::None,
             indexed: false,
         });
-        let layer = Layer::new(&clouds.settings.model, atmosphere);
+        let layer = Layer::new(&clouds.settings, atmosphere);
         let camera = layer.altitude(view.world_from_view.translation());
         let is_beyond = |info: &TransparentSortingInfo3d| match info {
             TransparentSortingInfo3d::Sorted { mesh_center, .. } if cloud.order == CloudOrder::Sorted => {
@@ -126,12 +131,17 @@ pub(crate) fn sort_in(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::reference::planet::PLANET_RADIUS;
+    use crate::{
+        reference::planet::PLANET_RADIUS,
+        settings::{CloudLayer, CloudLayers, CloudModel},
+    };
 
     #[test]
     fn things_are_sorted_by_the_side_of_the_layer() {
         let model = CloudModel { bottom: 1500.0, top: 4000.0, ..default() };
-        let layer = Layer::new(&model, None);
+        // What lies higher than the lowest deck does not sort.
+        let layers = CloudLayers(vec![CloudLayer { base: 8000.0, ..default() }]);
+        let layer = Layer::new(&CloudSettings { model, layers, ..default() }, None);
         for (camera, thing, beyond) in [
             (10.0, 0.0, false),
             (10.0, 2000.0, false),
@@ -150,10 +160,11 @@ mod tests {
     #[test]
     fn altitude_follows_the_curve_and_the_offset() {
         let far = Vec3::new(1e6, 0.0, 0.0);
-        let layer = Layer::new(&CloudModel::default(), None);
+        let layer = Layer::new(&CloudSettings::default(), None);
         let exact = PLANET_RADIUS.hypot(1e6) - PLANET_RADIUS;
         assert!((layer.altitude(far) - exact).abs() < 1e-3);
-        let shifted = Layer::new(&CloudModel { world_offset: far.as_dvec3(), ..default() }, None);
+        let model = CloudModel { world_offset: far.as_dvec3(), ..default() };
+        let shifted = Layer::new(&CloudSettings { model, ..default() }, None);
         assert!((shifted.altitude(Vec3::ZERO) - exact).abs() < 1e-3);
     }
 }

@@ -27,7 +27,7 @@ use super::{
     zones::{ExtractedZones, zones_around},
 };
 use crate::{
-    model::{MAX_ZONES, ModelSettings, ModelUniform, TangentFrame, TexelSizes},
+    model::{MAX_ZONES, ModelSettings, ModelUniform, TangentFrame, TexelSizes, decks},
     phases::ReadyTables,
     reference::planet::PLANET_RADIUS,
     settings::{
@@ -378,7 +378,12 @@ fn window_state(
     let model = &clouds.settings.model;
     let angle = texel_angle(view.clip_from_view, viewport, quality);
     let altitude = space.altitude as f32;
-    let to_shell = (model.bottom - altitude).max(altitude - model.top).max(300.0);
+    // To the nearest deck.
+    let to_shell = decks(model, clouds.settings.layers.shown().map(|(_, layer)| layer))
+        .into_iter()
+        .map(|deck| (deck.x - altitude).max(altitude - deck.y))
+        .fold(f32::INFINITY, f32::min)
+        .clamp(300.0, 1e7);
     let key = HistoryKey {
         size: marched_size(viewport, quality),
         viewport,

@@ -71,6 +71,10 @@ pub struct CloudLighting {
     /// Tint of the ambient light, linear RGB. Default white.
     #[reflect(@0.0..=10.0_f32)]
     pub ambient_tint: Vec3,
+    /// How much of its colour the ambient light loses, towards grey of the same luminance (Högfeldt's ambient desaturate;
+    /// 0 none, 1 all). Default 0.
+    #[reflect(@0.0..=1.0_f32)]
+    pub ambient_desaturation: f32,
     /// Mean radiance of the sky where the scene has no `Atmosphere`, as a share of the sun's illuminance
     /// (1/sr, linear RGB). Default (0.026, 0.037, 0.055): a clear day's.
     #[reflect(@0.0..=1.0_f32)]
@@ -108,6 +112,7 @@ impl Default for CloudLighting {
             sun_strength: 1.0,
             ambient_strength: 1.0,
             ambient_tint: Vec3::ONE,
+            ambient_desaturation: 0.0,
             sky_fallback: Vec3::new(0.026, 0.037, 0.055),
             ground_albedo: Vec3::new(0.2, 0.2, 0.18),
             powder: 0.0,

@@ -49,6 +49,7 @@ fn place_of(member: &str) -> (usize, usize) {
         offset += match kind.trim().trim_end_matches(',') {
             "mat4x4<f32>" => 64,
             "vec4<f32>" | "vec4<u32>" => 16,
+            "array<vec4<f32>, 4>" => 64,
             other => panic!("a member of type {other}"),
         };
     }

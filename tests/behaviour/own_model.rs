@@ -1,9 +1,11 @@
 //! A model of one's own: taken, refused with its line, and taken again.
 
 use bevy::prelude::*;
-use bevy_cumulus::{CloudStatus, ModelShader, ModelShaderError};
+use bevy_cumulus::{ModelShader, ModelShaderError, prelude::*};
+use rand::{SeedableRng, rngs::StdRng};
 
 use crate::{
+    bound::{Question, ask, model_app, question},
     gpu::{assert_shaders_compile, run_updates, times_logged},
     stage::{linear_pixels, settle, slab, slab_app, spawn_linear},
     view::until_drawn,
@@ -30,7 +32,7 @@ fn a_model_that_does_not_compile_leaves_the_last_good_one() {
     for (spoilt, line) in [
         (good.replace("return 1.0;", "\n\nreturn 1u;"), 5),
         (good.replace("return empty_medium();", "\nreturn nothing_7391();"), 7),
-        (good.replace("return vec2(", "\nreturn vec2(("), 4),
+        (good.replace("return vec2(", "\nreturn vec2(("), 3),
     ] {
         assert_ne!(spoilt, good);
         let says = format!("the model does not compile, line {line}: ");
@@ -60,4 +62,24 @@ fn a_model_that_does_not_compile_leaves_the_last_good_one() {
     until_drawn(&mut app);
     settle(&mut app);
     assert!(linear_pixels(&app, &view) == picture);
+}
+
+#[test]
+fn the_examples_rings_keep_a_models_promises() {
+    let mut app = model_app();
+    app.insert_resource(ModelShader(include_str!("../../examples/custom_model/rings.wesl").to_owned()));
+    run_updates(&mut app, 3);
+    let model = CloudModel { bottom: 620.0, top: 4580.0, map_scale: 12_000.0, ..default() };
+    let mut rng = StdRng::seed_from_u64(600);
+    let questions: Vec<Question> = (0..40_000).map(|_| question(&mut rng, &model)).collect();
+    let (mut empty, mut cloud) = (0, 0);
+    for (question, answer) in questions.iter().zip(ask(&mut app, &model, &questions)) {
+        let [bound, density, extinction, _, extinction_bound] = answer;
+        assert!(answer.iter().all(|v| v.is_finite() && *v >= 0.0), "{question:?}: {answer:?}");
+        assert!(density <= bound && extinction <= extinction_bound, "{question:?}: {answer:?}");
+        empty += u32::from(bound == 0.0);
+        cloud += u32::from(density > 0.0);
+    }
+    println!("{empty} certainly empty, {cloud} in cloud");
+    assert!(empty > 10_000 && cloud > 100, "{empty} certainly empty, {cloud} in cloud");
 }

@@ -33,7 +33,8 @@ impl Plot<'_> {
     pub fn write_log(&self, path: &Path) -> Result<()> {
         let [x, y] = self.ranges(1.25)?;
         let root = SVGBackend::new(path, SIZE).into_drawing_area();
-        self.draw(&root, (x.0..x.1).log_scale(), (y.0..y.1).log_scale()).map_err(|e| failed(path, &e))
+        self.draw(&root, (x.0..x.1).log_scale(), (y.0..y.1).log_scale(), SeriesLabelPosition::UpperLeft)
+            .map_err(|e| failed(path, &e))
     }
 
     /// Only the vertical axis logarithmic.
@@ -42,7 +43,7 @@ impl Plot<'_> {
         let xs = || self.series.iter().flat_map(|s| s.points.iter().map(|p| p.0));
         let x = (xs().fold(f64::MAX, f64::min) - 0.2)..(xs().fold(f64::MIN, f64::max) + 0.2);
         let root = SVGBackend::new(path, SIZE).into_drawing_area();
-        self.draw(&root, x, (y.0..y.1).log_scale()).map_err(|e| failed(path, &e))
+        self.draw(&root, x, (y.0..y.1).log_scale(), SeriesLabelPosition::LowerLeft).map_err(|e| failed(path, &e))
     }
 
     /// Least and largest of both coordinates, apart by some room.
@@ -63,6 +64,7 @@ impl Plot<'_> {
         root: &DrawingArea<SVGBackend<'a>, Shift>,
         x: X,
         y: Y,
+        legend: SeriesLabelPosition,
     ) -> Result<(), DrawingAreaErrorKind<<SVGBackend<'a> as DrawingBackend>::ErrorType>>
     where
         X: AsRangedCoord<Value = f64>,
@@ -96,7 +98,7 @@ impl Plot<'_> {
         }
         chart
             .configure_series_labels()
-            .position(SeriesLabelPosition::UpperLeft)
+            .position(legend)
             .background_style(WHITE.mix(0.85))
             .border_style(RGBColor(215, 215, 215))
             .label_font((FONT, 13))

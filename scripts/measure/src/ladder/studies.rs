@@ -53,7 +53,7 @@ const LIGHT_REACH: f64 = 1000.0;
 
 /// Texels along a side of the noise volumes.
 const NOISE: [u32; 4] = [32, 64, 128, 256];
-const SCREENS: [&str; 6] = ["64x36", "96x54", "128x72", "192x108", "256x144", "384x216"];
+const SCREENS: [&str; 5] = ["64x36", "96x54", "128x72", "192x108", "256x144"];
 /// Costa's table 12.
 const FULL_SCREENS: [&str; 13] = [
     "320x240",
