@@ -43,7 +43,8 @@ impl ZoneAt {
         let place = map.as_vec2();
         let zone = ZoneUniform {
             place: Vec4::new(place.x, place.y, self.radius, self.edge),
-            strength: Vec4::new(self.strength, 0.0, 0.0, 0.0),
+            // At full strength more than map and coverage together, whatever they are.
+            strength: Vec4::new(self.strength * (1.0 + self.strength * self.strength), 0.0, 0.0, 0.0),
         };
         (map.length() - f64::from(self.radius), zone)
     }

@@ -101,7 +101,7 @@ mod tests {
             let (seen, _) = around(&zones, camera);
             let on_map = frame.map + seen[0].place.truncate().truncate().as_dvec2();
             assert!((on_map - bevy::math::DVec2::new(arc, 0.0)).length() < 1.0, "{camera}: {on_map}");
-            assert_eq!((seen[0].place.z, seen[0].strength.x), (500.0, 1.0));
+            assert_eq!((seen[0].place.z, seen[0].strength.x), (500.0, 2.0));
         }
     }
 

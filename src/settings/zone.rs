@@ -32,7 +32,7 @@ pub struct CloudZone {
     /// Width of the edge, inside the radius, in which its strength falls to nothing (m); at most the radius. Default 2000.
     #[reflect(@0.0..=1_000_000.0_f32)]
     pub edge: f32,
-    /// Added to coverage: −1 clears the sky, 1 closes it. Default −1.
+    /// How much cloud: −1 clears the sky whatever its coverage, 1 closes it; s adds s + s³ to coverage. Default −1.
     #[reflect(@-1.0..=1.0_f32)]
     pub strength: f32,
 }

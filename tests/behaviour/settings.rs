@@ -406,6 +406,7 @@ fn the_readme_names_every_field() {
         CloudTextures::type_info(),
         CloudTextureSlots::type_info(),
         CloudClock::type_info(),
+        CloudZone::type_info(),
         CloudView::type_info(),
     ];
     for info in all {

@@ -66,8 +66,7 @@ fn model_app(layered: bool) -> App {
     let model =
         CloudModel { bottom: 600.0, top: 1400.0, coverage: 0.3, wind_skew: 0.0, noise_strength: 0.3, ..default() };
     if layered {
-        let layer =
-            CloudLayer { base: 600.0, base_rise: 0.0, thickness: 800.0, wind_skew: 0.0, coverage: 0.3, ..default() };
+        let layer = CloudLayer { base: 600.0, base_rise: 0.0, thickness: 800.0, wind_skew: 0.0, ..default() };
         let map = WeatherRecipe { cover: 5.0, height_variation: 0.0, ..default() };
         app.insert_resource(CloudModel { enabled: false, ..model });
         app.insert_resource(CloudLayers(vec![CloudLayer { map, shape_strength: 0.3, peak_height: 0.5, ..layer }]));

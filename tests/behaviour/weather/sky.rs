@@ -31,7 +31,7 @@ fn a_report_becomes_layers_with_its_cover_bases_and_wind() {
 
 #[test]
 fn it_rains_from_the_cloud_that_rain_falls_from() {
-    let storm = layers("KMCO 032153Z 20015G30KT 3SM +TSRA BKN020CB OVC060 24/22 A2990", 29.0);
+    let storm = layers("KMCO 032153Z 20015G30KT 3SM +TSRA BKN020CB OVC080 24/22 A2990", 29.0);
     assert_eq!((&*storm[0].name, &*storm[1].name), ("cumulonimbus 0", "altostratus 1"));
     assert!(storm[0].top() > 11_000.0 && storm[0].anvil > 0.5);
     assert_eq!((storm[0].rain, storm[1].rain), (1.0, 0.0));
@@ -54,7 +54,7 @@ fn fog_lies_on_the_ground() {
     let fog = &all[0];
     assert_eq!((&*fog.name, fog.base, fog.wind), ("fog", -3.0, Vec3::ZERO));
     assert!((fog.extinction - 3.912 / 200.0).abs() < 1e-6 && fog.thickness < 100.0, "{fog:?}");
-    let thin = layers("LFPG 230600Z 05003KT 0700 FG SCT002 BKN200 08/08 Q1025", 119.0);
+    let thin = layers("LFPG 230600Z 05003KT 0700 FG SCT002 BKN150 08/08 Q1025", 119.0);
     assert_eq!(thin.iter().map(|l| &*l.name).collect::<Vec<_>>(), ["fog", "cumulus 0", "altocumulus 1"]);
 }
 
