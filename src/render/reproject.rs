@@ -24,6 +24,8 @@ pub(crate) struct Pose {
     /// Wind (m/s, tangent frame), and how fast shapes change besides (m/s).
     pub wind: Vec3,
     pub rise: f32,
+    /// How fast a transition moves outlines (m/s): slow enough to be at rest, but a leap in time is a cut.
+    pub outlines: f32,
     /// Metres between the camera and the nearest cloud there may be, at least 300, and those that a marched texel
     /// spans there.
     pub to_shell: f32,
@@ -61,7 +63,7 @@ impl Pose {
             && (0.8..1.25).contains(&zoom)
             && turned(self, before) <= 0.03
             && dimmed(self, before) < 0.2
-            && (self.rise * (self.seconds - before.seconds) as f32).abs() < 30.0
+            && ((self.rise + self.outlines) * (self.seconds - before.seconds) as f32).abs() < 30.0
     }
 
     /// Whether the view was cut from the frame `before` this one.
@@ -164,6 +166,7 @@ mod tests {
             seconds: 0.0,
             wind: Vec3::X * 10.0,
             rise: 0.0,
+            outlines: 0.0,
             to_shell: 1000.0,
             texel: 20.0,
         }

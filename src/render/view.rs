@@ -404,7 +404,8 @@ fn window_state(
         exposure: item.camera.exposure,
         seconds: clouds.settings.clock.seconds,
         wind: model.wind.with_y(0.0),
-        rise: model.wind.y.abs() + model.evolution.abs() + clouds.outline_speed,
+        rise: model.wind.y.abs() + model.evolution.abs(),
+        outlines: clouds.outline_speed,
         to_shell,
         texel: angle * to_shell,
     };
