@@ -185,7 +185,7 @@ fn what_a_box_uncovers_is_right_within_four_frames() {
                 _ => 0.45 * alone,
             };
             // Single frames are too noisy to tell.
-            let few = temporal == TemporalMode::Off || ghosts * 200 < pixels;
+            let few = temporal == TemporalMode::Off || ghosts * 150 < pixels;
             assert!(error < most && few, "{temporal:?} {resolution:?}: {error} for {alone}, {ghosts} of {pixels}");
         }
     }
