@@ -261,7 +261,8 @@ fn a_wire_in_fog_has_no_halo_and_its_share_of_fog() {
                 assert!(off < 0.06, "{what}: {shown}, not {expected}");
                 let alone = cloud.truncate() * exposure;
                 let off = (alone - fog).abs().max_element();
-                assert!(off < 0.16 * fog.max_element().max(0.5), "{what}: {alone}, not {fog}");
+                // Where no surface is, some light of the sky behind comes through the fog, which is a little darker than it.
+                assert!(off < 0.22 * fog.max_element().max(0.5), "{what}: {alone}, not {fog}");
             }
             assert_eq!(pixels, SIZE.y);
         }
