@@ -38,7 +38,7 @@ const BACK_WITHIN: Duration = Duration::from_secs(120);
 /// Frames rendered after everything is ready and before the first that counts.
 const SETTLING_FRAMES: u32 = 4;
 /// The same for a later picture of a batch, whose sky and textures are there.
-const SETTLED_FRAMES: u32 = 2;
+const SETTLED_FRAMES: u32 = 3;
 
 /// What came out.
 pub struct Shot {

@@ -173,7 +173,7 @@ impl Default for CloudQuality {
 }
 
 impl CloudQuality {
-    /// For weak GPUs: a quarter of the resolution, long steps, 40 km.
+    /// For weak GPUs: a quarter of the resolution, long steps, 50 km.
     pub fn low() -> Self {
         Self {
             resolution: MarchResolution::Quarter,
