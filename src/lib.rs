@@ -33,6 +33,7 @@
 //! The plugin spawns nothing: the sun is the scene's brightest `DirectionalLight`, the sky its `Atmosphere`.
 #![warn(missing_docs)]
 
+mod capability;
 #[cfg(feature = "inspector")]
 pub mod inspector;
 mod model;
@@ -43,15 +44,7 @@ pub mod settings;
 pub mod textures;
 pub mod weather;
 
-use bevy::{
-    prelude::*,
-    render::{
-        RenderApp,
-        render_resource::{DownlevelFlags, TextureFormat, TextureUsages},
-        renderer::{RenderAdapter, RenderDevice},
-    },
-    shader::ShaderLoader,
-};
+use bevy::{prelude::*, render::RenderApp, shader::ShaderLoader};
 
 pub use model::{ModelShader, ModelShaderError};
 pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
@@ -108,7 +101,7 @@ impl Plugin for CloudsPlugin {
             status.set_unsupported("there is no renderer (no RenderPlugin)".to_owned());
             return;
         };
-        if let Some(reason) = missing_capability(render_app.world()) {
+        if let Some(reason) = capability::missing_capability(render_app.world()) {
             warn!("clouds are off: {reason}");
             status.set_unsupported(reason);
             return;
@@ -117,36 +110,6 @@ impl Plugin for CloudsPlugin {
         textures::build_render(render_app);
         render::build_render(render_app);
     }
-}
-
-/// What the device lacks, with the adapter's name.
-fn missing_capability(world: &World) -> Option<String> {
-    let adapter = world.get_resource::<RenderAdapter>()?;
-    let device = world.get_resource::<RenderDevice>()?;
-    let name = adapter.get_info().name;
-    let flags = adapter.get_downlevel_capabilities().flags;
-    if !flags.contains(DownlevelFlags::COMPUTE_SHADERS) {
-        return Some(format!("{name} has no compute shaders"));
-    }
-    let limits = device.limits();
-    for (what, has, needs) in [
-        ("max_storage_textures_per_shader_stage", limits.max_storage_textures_per_shader_stage, 3),
-        ("max_storage_buffers_per_shader_stage", limits.max_storage_buffers_per_shader_stage, 2),
-        ("max_compute_invocations_per_workgroup", limits.max_compute_invocations_per_workgroup, 128),
-        ("max_bind_groups", limits.max_bind_groups, 3),
-    ] {
-        if has < needs {
-            return Some(format!("{name}: {what} is {has}, and clouds need {needs}"));
-        }
-    }
-    for format in
-        [TextureFormat::Rgba8Unorm, TextureFormat::Rgba16Float, TextureFormat::Rgba32Float, TextureFormat::R32Uint]
-    {
-        if !adapter.get_texture_format_features(format).allowed_usages.contains(TextureUsages::STORAGE_BINDING) {
-            return Some(format!("{name}: {format:?} cannot be a storage texture"));
-        }
-    }
-    None
 }
 
 /// Compiles the README's quick start.

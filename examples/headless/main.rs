@@ -5,6 +5,7 @@
 mod batch;
 #[path = "../common/mod.rs"]
 mod common;
+mod finite;
 mod options;
 mod output;
 mod shoot;

@@ -7,7 +7,7 @@ use std::{
 };
 
 use anyhow::{Context as _, Result, anyhow, bail, ensure};
-use image::{DynamicImage, ImageFormat, Rgba32FImage};
+use image::{DynamicImage, ImageFormat};
 use serde::Serialize;
 use serde_json::Value;
 
@@ -52,9 +52,8 @@ pub fn write(plan: &Plan, shot: &Shot) -> Result<()> {
         let picture = shot.picture.as_ref().ok_or_else(|| anyhow!("--out: no picture came back"))?;
         put(path, &encode(&DynamicImage::ImageRgb8(picture.clone()), ImageFormat::Png)?)?;
     }
-    let cloud = shot.cloud.as_ref();
     if let Some(path) = &plan.cloud {
-        let cloud = cloud.ok_or_else(|| anyhow!("--cloud: no cloud buffer came back"))?;
+        let cloud = shot.cloud.as_ref().ok_or_else(|| anyhow!("--cloud: no cloud buffer came back"))?;
         put(path, &encode(&DynamicImage::ImageRgba32F(cloud.clone()), ImageFormat::OpenExr)?)?;
     }
     if let Some(path) = &plan.noise {
@@ -67,7 +66,10 @@ pub fn write(plan: &Plan, shot: &Shot) -> Result<()> {
         let all = Report { adapter: &shot.adapter, size: plan.size, settings, passes, frame };
         put(path, serde_json::to_string_pretty(&all)?.as_bytes())?;
     }
-    cloud.map_or(Ok(()), finite)
+    match &shot.flaw {
+        Some(flaw) => bail!("{flaw}"),
+        None => Ok(()),
+    }
 }
 
 fn encode(image: &DynamicImage, format: ImageFormat) -> Result<Vec<u8>> {
@@ -78,14 +80,4 @@ fn encode(image: &DynamicImage, format: ImageFormat) -> Result<Vec<u8>> {
 
 fn put(path: &Path, bytes: &[u8]) -> Result<()> {
     fs::write(path, bytes).with_context(|| format!("cannot write {}", path.display()))
-}
-
-/// An 8-bit picture hides NaN, so the cloud buffer behind it is looked at.
-fn finite(cloud: &Rgba32FImage) -> Result<()> {
-    let bad = |p: &image::Rgba<f32>| p.0.iter().any(|v| !v.is_finite());
-    let count = cloud.pixels().filter(|p| bad(p)).count();
-    if let Some((x, y, pixel)) = cloud.enumerate_pixels().find(|(_, _, p)| bad(p)) {
-        bail!("the cloud buffer is not finite in {count} pixels, the first at {x},{y}: {:?}", pixel.0);
-    }
-    Ok(())
 }

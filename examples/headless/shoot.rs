@@ -27,6 +27,7 @@ use image::{RgbImage, Rgba32FImage};
 
 use crate::{
     common,
+    finite::flaw,
     options::Plan,
     status::Stage,
     timings::{LAG, Timings},
@@ -45,6 +46,8 @@ pub struct Shot {
     pub picture: Option<RgbImage>,
     pub cloud: Option<Rgba32FImage>,
     pub noise: Option<Rgba32FImage>,
+    /// Which of the floats behind the picture are none, in words.
+    pub flaw: Option<String>,
     pub timings: Timings,
     pub adapter: String,
 }
@@ -54,6 +57,7 @@ pub struct Shot {
 struct Caught {
     picture: Option<Image>,
     cloud: Option<Vec<u8>>,
+    second_cloud: Option<Vec<u8>>,
     noise: Option<Vec<u8>>,
 }
 
@@ -88,6 +92,8 @@ struct Studio {
     target: Handle<Image>,
     /// Absent where only timings are wanted, so that it costs them nothing.
     buffer: Option<Handle<Image>>,
+    /// The second camera's, which is only looked at.
+    second_buffer: Option<Handle<Image>>,
     noise: Option<Handle<Image>>,
 }
 
@@ -137,7 +143,9 @@ impl Studio {
 
         let mut images = world.resource_mut::<Assets<Image>>();
         let target = images.add(Image::new_target_texture(width, height, TextureFormat::Rgba8UnormSrgb, None));
-        let buffer = wants(Plan::wants_buffer).then(|| images.add(CloudBuffer::image(width, height)));
+        let mut make_buffer = || wants(Plan::wants_buffer).then(|| images.add(CloudBuffer::image(width, height)));
+        let buffer = make_buffer();
+        let second_buffer = plan.scene.split.then(make_buffer).flatten();
         let noise = wants(|plan| plan.noise.is_some()).then(|| images.add(CloudNoise::image(width, height)));
         let camera = world
             .spawn((
@@ -156,14 +164,14 @@ impl Studio {
         if let Some(noise) = &noise {
             world.entity_mut(camera).insert(CloudNoise(noise.clone()));
         }
-        let second = plan.scene.split.then(|| Self::split(world, camera, plan));
-        let mut studio = Self { app, camera, second, sun, target, buffer, noise };
+        let second = plan.scene.split.then(|| Self::split(world, camera, plan, second_buffer.as_ref()));
+        let mut studio = Self { app, camera, second, sun, target, buffer, second_buffer, noise };
         studio.pose(plan, 0);
         Ok(studio)
     }
 
     /// Leaves the left half to the camera, and gives the right one to another at a quarter of the resolution.
-    fn split(world: &mut World, camera: Entity, plan: &Plan) -> Entity {
+    fn split(world: &mut World, camera: Entity, plan: &Plan, buffer: Option<&Handle<Image>>) -> Entity {
         let left = UVec2::new((plan.size.0 / 2).max(1), plan.size.1);
         let right = UVec2::new((plan.size.0 - left.x).max(1), plan.size.1);
         let half = |x, physical_size| Camera {
@@ -178,6 +186,9 @@ impl Studio {
             half(plan.size.0 - right.x, right),
             CloudView { quality: Some(quality), debug: plan.debug, ..default() },
         ));
+        if let Some(buffer) = buffer {
+            world.entity_mut(second).insert(CloudBuffer(buffer.clone()));
+        }
         second
     }
 
@@ -313,8 +324,9 @@ impl Studio {
             );
         }
         type Slot = fn(&mut Caught) -> &mut Option<Vec<u8>>;
-        let slots: [(_, _, Slot); 2] = [
+        let slots: [(_, _, Slot); 3] = [
             (plan.wants_buffer(), &self.buffer, |caught| &mut caught.cloud),
+            (plan.wants_buffer(), &self.second_buffer, |caught| &mut caught.second_cloud),
             (plan.noise.is_some(), &self.noise, |caught| &mut caught.noise),
         ];
         let asked = slots.into_iter().filter_map(|(wanted, image, slot)| {
@@ -331,6 +343,7 @@ impl Studio {
         let caught = self.app.world().resource::<Caught>();
         (plan.out.is_none() || caught.picture.is_some())
             && (!plan.wants_buffer() || caught.cloud.is_some())
+            && (!plan.wants_buffer() || self.second_buffer.is_none() || caught.second_cloud.is_some())
             && (plan.noise.is_none() || caught.noise.is_some())
     }
 
@@ -344,16 +357,17 @@ impl Studio {
     fn strip(&mut self, plan: &Plan) -> Result<Shot> {
         let (width, height) = plan.size;
         let mut strip = RgbImage::new(width * plan.strip.len() as u32, height);
-        let mut last = None;
+        let (mut last, mut flaw) = (None, None);
         for (x, settings) in (0..).step_by(width as usize).zip(&plan.strip) {
             set(self.app.world_mut(), settings);
             let mut shot = self.picture(plan)?;
             let picture = shot.picture.take().ok_or_else(|| anyhow!("--out: no picture came back"))?;
             image::imageops::replace(&mut strip, &picture, x, 0);
+            flaw = flaw.or(shot.flaw.take());
             last = Some(shot);
         }
         let last = last.ok_or_else(|| anyhow!("the strip has no picture"))?;
-        Ok(Shot { picture: Some(strip), ..last })
+        Ok(Shot { picture: Some(strip), flaw, ..last })
     }
 
     fn shot(&mut self, plan: &Plan, timings: Timings) -> Result<Shot> {
@@ -361,11 +375,15 @@ impl Studio {
         let caught = std::mem::take(&mut *world.resource_mut::<Caught>());
         let picture = caught.picture.map(Image::try_into_dynamic).transpose();
         let picture = picture.map_err(|error| anyhow!("the picture: {error}"))?;
-        let [cloud, noise] =
-            [caught.cloud, caught.noise].map(|bytes| bytes.map(|bytes| cloud_image(plan.size, &bytes)).transpose());
+        let image = |bytes: Option<Vec<u8>>| bytes.map(|bytes| float_image(plan.size, &bytes)).transpose();
+        let (cloud, second, noise) = (image(caught.cloud)?, image(caught.second_cloud)?, image(caught.noise)?);
+        let floats =
+            [("the cloud buffer", &cloud), ("the second camera's cloud buffer", &second), ("the noise", &noise)];
+        let flaw = floats.into_iter().find_map(|(what, image)| flaw(what, image.as_ref()?));
         let info = world.resource::<RenderAdapterInfo>();
         let adapter = format!("{} ({:?})", info.name, info.backend);
-        Ok(Shot { picture: picture.map(|picture| picture.to_rgb8()), cloud: cloud?, noise: noise?, timings, adapter })
+        let picture = picture.map(|picture| picture.to_rgb8());
+        Ok(Shot { picture, cloud, noise, flaw, timings, adapter })
     }
 }
 
@@ -382,7 +400,7 @@ fn set(world: &mut World, settings: &CloudSettings) {
 }
 
 /// The image in a texture's bytes, whose rows are padded to a multiple of 256.
-fn cloud_image((width, height): (u32, u32), bytes: &[u8]) -> Result<Rgba32FImage> {
+fn float_image((width, height): (u32, u32), bytes: &[u8]) -> Result<Rgba32FImage> {
     let row = width as usize * 16;
     let stride = RenderDevice::align_copy_bytes_per_row(row);
     let values = bytes
@@ -396,5 +414,5 @@ fn cloud_image((width, height): (u32, u32), bytes: &[u8]) -> Result<Rgba32FImage
         .map(|b| f32::from_le_bytes(*b))
         .collect();
     Rgba32FImage::from_raw(width, height, values)
-        .ok_or_else(|| anyhow!("the cloud buffer came back with {} bytes, too few for {width}x{height}", bytes.len()))
+        .ok_or_else(|| anyhow!("an image came back with {} bytes, too few for {width}x{height}", bytes.len()))
 }

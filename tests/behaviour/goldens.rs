@@ -3,11 +3,11 @@
 //! Each is made by the headless example and compared with `tests/goldens/NAME.png`. After a change of the look that is
 //! meant, `CUMULUS_BLESS=1 cargo test --test behaviour goldens` writes them anew: look at each before it is committed.
 
-use std::{fs, path::PathBuf, process::Command};
+use std::{fs, path::PathBuf};
 
 use image::{ImageReader, RgbImage};
 
-use crate::{gpu::webgpu_limits, headless::binary};
+use crate::{gpu::webgpu_limits, headless::command};
 
 /// Least mean structural similarity (hybrid of MSSIM on luma and RMS on chroma; 1 is the same). One machine repeats its
 /// pictures to the bit. Software renderers differ by version and by what SIMD the CPU has: with other code for
@@ -44,8 +44,7 @@ fn read(path: &std::path::Path) -> Result<RgbImage, String> {
 fn render(name: &str, arguments: &[&str]) -> RgbImage {
     let out = failures().join(format!("{name}.png"));
     let path = out.to_string_lossy().into_owned();
-    let output =
-        Command::new(binary()).args(arguments).args(SMALL).args(["--out", &path]).output().expect("the example starts");
+    let output = command().args(arguments).args(SMALL).args(["--out", &path]).output().expect("the example starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{name} failed with {:?}: {said}", output.status.code());
     read(&out).unwrap_or_else(|error| panic!("{path}: {error}"))

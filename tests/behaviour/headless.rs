@@ -16,6 +16,10 @@ use bevy_cumulus::settings::{CloudPreset, CloudSettings};
 use image::{DynamicImage, ImageReader, Rgba32FImage};
 use serde_json::Value;
 
+/// An example has no tests of its own.
+#[path = "../../examples/headless/finite.rs"]
+mod finite;
+
 /// Textures small enough to be baked in no time.
 const SMALL: [&str; 4] = ["--set", "textures.volume_size=32", "--set", "textures.map_size=256"];
 
@@ -54,8 +58,16 @@ impl Drop for Folder {
     }
 }
 
+/// The example as it is started by hand: cargo and the scripts tell Bevy where the repository's assets are, a shell does
+/// not.
+pub fn command() -> Command {
+    let mut command = Command::new(binary());
+    command.env_remove("CARGO_MANIFEST_DIR").env_remove("BEVY_ASSET_ROOT");
+    command
+}
+
 fn run_in(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(binary()).args(arguments).current_dir(folder).output().expect("the example starts")
+    command().args(arguments).current_dir(folder).output().expect("the example starts")
 }
 
 /// Runs the example in a folder of its own and returns that.
@@ -231,6 +243,23 @@ fn the_cloud_buffer_holds_cloud_and_clear_sky() {
     // Sunlit cloud is some thousands of cd/m²: exposure is divided out.
     let brightest = cloudy.iter().map(|p| p.0[1]).fold(0.0, f32::max);
     assert!((2.0e3..2.0e5).contains(&brightest), "{brightest} cd/m²");
+}
+
+#[test]
+fn what_is_no_number_is_named() {
+    let whole = Rgba32FImage::from_fn(3, 2, |x, y| image::Rgba([x as f32, y as f32, 6e4, 1.0]));
+    assert_eq!(finite::flaw("the cloud buffer", &whole), None);
+    for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
+        for channel in 0..4 {
+            let mut image = whole.clone();
+            image.get_pixel_mut(1, 1).0[channel] = bad;
+            image.get_pixel_mut(2, 1).0[channel] = bad;
+            let said = finite::flaw("the noise", &image).expect("two pixels are bad");
+            for part in ["the noise", "2 pixels", "1,1"] {
+                assert!(said.contains(part), "channel {channel}, {bad}: {said}");
+            }
+        }
+    }
 }
 
 #[test]

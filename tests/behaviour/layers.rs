@@ -8,7 +8,7 @@ use crate::{
     bad_input::refuses,
     bound::{Answer, Question, ask, at, model_app, question},
     gpu::{run_until, run_updates, times_logged},
-    stage::{exact, linear_pixels, settle, spawn_linear},
+    stage::{exact, settle, spawn_linear, steps},
     view::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
 };
 
@@ -217,29 +217,6 @@ fn put(app: &mut App, layers: &[CloudLayer]) {
     run_updates(app, 2);
     until_drawn(app);
     settle(app);
-}
-
-/// Steps that the picture of [`CloudDebugView::Steps`] tells of, of 512 at most.
-fn steps(app: &mut App, view: &View) -> Vec<f32> {
-    app.world_mut().get_mut::<CloudView>(view.camera).expect("it shows clouds").debug = CloudDebugView::Steps;
-    run_updates(app, 1);
-    until_drawn(app);
-    run_updates(app, 3);
-    let most = 1.0 + app.world().resource::<CloudQuality>().max_steps as f32;
-    let of = |p: &Vec3| {
-        let t = match *p {
-            Vec3 { x, z, .. } if x <= 0.0 => z,
-            Vec3 { x, .. } if x < 1.0 => 1.0 + x,
-            Vec3 { y, .. } if y < 1.0 => 2.0 + y,
-            Vec3 { z, .. } => 3.0 + z,
-        };
-        most.powf(0.25 * t) - 1.0
-    };
-    let counts = linear_pixels(app, view).iter().map(of).collect();
-    app.world_mut().get_mut::<CloudView>(view.camera).expect("it shows clouds").debug = CloudDebugView::None;
-    until_drawn(app);
-    settle(app);
-    counts
 }
 
 #[test]

@@ -1,12 +1,12 @@
 //! Order: nothing of ours runs in an order that the schedule leaves open.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 
 use bevy::{
     core_pipeline::schedule::Core3d,
-    ecs::schedule::{InternedScheduleLabel, ScheduleLabel, Schedules, SystemKey},
+    ecs::schedule::{InternedScheduleLabel, Schedules, SystemKey},
     prelude::*,
-    render::{ExtractSchedule, Render, RenderApp, renderer::RenderGraph},
+    render::RenderApp,
 };
 
 use bevy_cumulus::prelude::*;
@@ -15,9 +15,14 @@ use crate::view::{Sky, clouds_app_with, spawn_sun, spawn_view, until_drawn};
 
 const OURS: &str = "bevy_cumulus::";
 
-/// An app that draws, so that every schedule has been built.
+/// An app that draws, with all of our plugins.
 fn drawn() -> App {
-    let mut app = clouds_app_with((CloudsPlugin, CloudFieldPlugin));
+    let mut app = clouds_app_with((
+        CloudsPlugin,
+        CloudFieldPlugin,
+        #[cfg(feature = "inspector")]
+        bevy_cumulus::inspector::CloudInspectorPlugin,
+    ));
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     spawn_view(&mut app, UVec2::new(8, 8), Transform::default(), Sky::Atmosphere);
     until_drawn(&mut app);
@@ -25,11 +30,11 @@ fn drawn() -> App {
 }
 
 /// Conflicts of our systems whose order is open, in words, and how many systems of ours the schedule has.
-fn open_conflicts(world: &World, label: InternedScheduleLabel) -> (Vec<String>, usize) {
-    let schedule = world.resource::<Schedules>().get(label).unwrap_or_else(|| panic!("there is no schedule {label:?}"));
+fn open_conflicts(world: &World, schedule: &Schedule) -> (Vec<String>, usize) {
+    let label = schedule.label();
     let names: HashMap<SystemKey, String> = schedule
         .systems()
-        .unwrap_or_else(|_| panic!("{label:?} has not run"))
+        .unwrap_or_else(|_| panic!("{label:?} is not built"))
         .map(|(key, system)| (key, system.name().to_string()))
         .collect();
     let ours = names.values().filter(|name| name.contains(OURS)).count();
@@ -47,20 +52,61 @@ fn open_conflicts(world: &World, label: InternedScheduleLabel) -> (Vec<String>, 
     (found, ours)
 }
 
+/// The same of every schedule of a world; and the names of those that have systems of ours.
+fn all_open_conflicts(world: &mut World) -> (Vec<String>, BTreeSet<String>) {
+    let labels: Vec<InternedScheduleLabel> =
+        world.resource::<Schedules>().iter().map(|(_, schedule)| schedule.label()).collect();
+    let (mut found, mut with_ours) = (Vec::new(), BTreeSet::new());
+    for label in labels {
+        world.schedule_scope(label, |world, schedule| {
+            // One that has not run, such as a window's, is built here.
+            schedule.initialize(world).unwrap_or_else(|error| panic!("{label:?} cannot be built: {error}"));
+            let (conflicts, ours) = open_conflicts(world, schedule);
+            found.extend(conflicts);
+            if ours > 0 {
+                with_ours.insert(format!("{label:?}"));
+            }
+        });
+    }
+    (found, with_ours)
+}
+
 #[test]
 fn no_system_of_ours_is_ambiguous() {
-    let app = drawn();
-    let main = [First.intern(), PreStartup.intern(), PreUpdate.intern(), Last.intern()];
-    let render = [ExtractSchedule.intern(), Render.intern(), RenderGraph.intern(), Core3d.intern()];
-    let render_world = app.sub_app(RenderApp).world();
-    let worlds = main.map(|label| (app.world(), label)).into_iter().chain(render.map(|label| (render_world, label)));
-    let mut found = Vec::new();
-    for (world, label) in worlds {
-        let (conflicts, ours) = open_conflicts(world, label);
-        assert!(ours > 0, "{label:?} has no system of ours: names changed, or a list here is old");
-        found.extend(conflicts);
+    let mut app = drawn();
+    let (mut found, main) = all_open_conflicts(app.world_mut());
+    let (of_render, render) = all_open_conflicts(app.sub_app_mut(RenderApp).world_mut());
+    found.extend(of_render);
+    // Else names changed, and ours were not looked at.
+    for label in ["First", "PreStartup", "PreUpdate", "Last"] {
+        assert!(main.contains(label), "{label} has no system of ours: {main:?}");
     }
+    if cfg!(feature = "inspector") {
+        assert!(main.contains("EguiPrimaryContextPass") && main.contains("PostUpdate"), "no panel: {main:?}");
+    }
+    for label in ["RenderStartup", "ExtractSchedule", "Render", "RenderGraph", "Core3d"] {
+        assert!(render.contains(label), "{label} has no system of ours: {render:?}");
+    }
+    println!("looked at {main:?} and {render:?}");
     assert!(found.is_empty(), "order left open:\n{}", found.join("\n"));
+}
+
+#[test]
+fn an_open_order_is_seen() {
+    // Named as systems of ours are, since the tests' own crate is not called so.
+    mod bevy_cumulus {
+        use bevy::prelude::*;
+        #[derive(Resource, Default)]
+        pub struct Shared;
+        pub fn one(_: ResMut<Shared>) {}
+        pub fn other(_: ResMut<Shared>) {}
+    }
+    let mut app = App::new();
+    app.init_resource::<bevy_cumulus::Shared>().add_systems(Update, bevy_cumulus::one);
+    assert_eq!(all_open_conflicts(app.world_mut()), (Vec::new(), BTreeSet::from(["Update".to_owned()])));
+    app.add_systems(Update, bevy_cumulus::other);
+    let (found, _) = all_open_conflicts(app.world_mut());
+    assert!(found.len() == 1 && found[0].contains("Shared"), "{found:?}");
 }
 
 #[test]

@@ -1,11 +1,16 @@
 //! A uniform slab through the unchanged renderer: a model of one's own, and answers in closed form to test against.
+//! `slab_settings` turns on, one by one, what is off here.
 //!
 //! What is drawn is stored as f16. A device may round or cut (Mesa's software driver cuts): up to 2⁻¹⁰ = 9.8e-4 of the
 //! value.
 
 use std::{f64::consts::PI, path::Path};
 
-use bevy::{light::light_consts::lux, math::DVec3, prelude::*};
+use bevy::{
+    light::light_consts::lux,
+    math::{DVec2, DVec3},
+    prelude::*,
+};
 use bevy_cumulus::{
     CloudsPlugin, ModelShader,
     prelude::*,
@@ -17,16 +22,16 @@ use crate::{
     view::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, spawn_sun, spawn_view, until_drawn},
 };
 
-const BOTTOM: f64 = 1500.0;
-const TOP: f64 = 2500.0;
-const ALBEDO: [f64; 3] = [0.9, 0.75, 0.5];
+pub const BOTTOM: f64 = 1500.0;
+pub const TOP: f64 = 2500.0;
+pub const ALBEDO: [f64; 3] = [0.9, 0.75, 0.5];
 /// The last place of f16, and a little for what f32 adds on the way; and the smallest step of f16.
-const STORED: f64 = 1.05e-3;
-const LEAST: f64 = 6e-8;
-const SIZE: UVec2 = UVec2::new(9, 7);
+pub const STORED: f64 = 1.05e-3;
+pub const LEAST: f64 = 6e-8;
+pub const SIZE: UVec2 = UVec2::new(9, 7);
 
 /// Constant extinction (1/m) between two altitudes. The bound is exact.
-fn slab(extinction: f64) -> String {
+pub fn slab(extinction: f64) -> String {
     format!(
         "import bevy_cumulus::model::medium::{{Medium, empty_medium}};
 import bevy_cumulus::model::planet::altitude;
@@ -55,7 +60,7 @@ fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
 }
 
 /// Single scattering by an isotropic medium, and nothing else.
-fn plain_light() -> CloudLighting {
+pub fn plain_light() -> CloudLighting {
     CloudLighting {
         octaves: 1,
         diffusion: 0.0,
@@ -69,7 +74,7 @@ fn plain_light() -> CloudLighting {
 }
 
 /// Every sample where the closed form has it, and none left out.
-fn exact_march(step: f32) -> CloudQuality {
+pub fn exact_march(step: f32) -> CloudQuality {
     CloudQuality {
         resolution: MarchResolution::Full,
         step,
@@ -86,8 +91,13 @@ fn exact_march(step: f32) -> CloudQuality {
     }
 }
 
-fn slab_app(extinction: f64, sun: Vec3) -> (App, View) {
-    let model = ModelShader(slab(extinction));
+pub fn slab_app(extinction: f64, sun: Vec3) -> (App, View) {
+    view_of(slab(extinction), sun)
+}
+
+/// A view of this model.
+pub fn view_of(model: String, sun: Vec3) -> (App, View) {
+    let model = ModelShader(model);
     let mut app = clouds_app_with(move |app: &mut App| {
         app.insert_resource(model.clone()).add_plugins(CloudsPlugin);
     });
@@ -98,7 +108,7 @@ fn slab_app(extinction: f64, sun: Vec3) -> (App, View) {
 }
 
 /// A viewpoint: the camera's altitude (m) and pitch (degrees up).
-fn looking(height: f32, pitch: f32) -> Transform {
+pub fn looking(height: f32, pitch: f32) -> Transform {
     Transform::from_xyz(0.0, height, 0.0).with_rotation(Quat::from_rotation_x(pitch.to_radians()))
 }
 
@@ -116,25 +126,30 @@ const VIEWPOINTS: [(f32, f32); 9] = [
 ];
 
 /// Directions through the middles of the pixels, row by row.
-fn directions(camera: &Transform) -> Vec<DVec3> {
+pub fn directions(camera: &Transform) -> Vec<DVec3> {
+    directions_through(camera, |_| DVec2::splat(0.5))
+}
+
+/// Directions through a place (0 to 1, from the top left) in each pixel, row by row.
+pub fn directions_through(camera: &Transform, place: impl Fn(UVec2) -> DVec2) -> Vec<DVec3> {
     let half = (f64::from(PerspectiveProjection::default().fov) / 2.0).tan();
     let size = SIZE.as_dvec2();
     (0..SIZE.y)
-        .flat_map(|y| (0..SIZE.x).map(move |x| (f64::from(x) + 0.5, f64::from(y) + 0.5)))
-        .map(|(x, y)| {
-            let across = (2.0 * x / size.x - 1.0) * half * size.x / size.y;
-            let up = (1.0 - 2.0 * y / size.y) * half;
+        .flat_map(|y| (0..SIZE.x).map(move |x| UVec2::new(x, y)))
+        .map(|pixel| {
+            let at = (pixel.as_dvec2() + place(pixel)) / size;
+            let (across, up) = ((2.0 * at.x - 1.0) * half * size.x / size.y, (1.0 - 2.0 * at.y) * half);
             camera.rotation.as_dquat() * DVec3::new(across, up, -1.0).normalize()
         })
         .collect()
 }
 
-fn spans(height: f64, mu: f64) -> Vec<[f64; 2]> {
+pub fn spans(height: f64, mu: f64) -> Vec<[f64; 2]> {
     shell_intervals(height, mu, BOTTOM, TOP, PLANET_RADIUS, 1e7)
 }
 
 /// Metres of slab along a ray, and how far f32 may be off: what a last place of the ray's slope changes, and of the length.
-fn length_in_slab(height: f64, mu: f64) -> (f64, f64) {
+pub fn length_in_slab(height: f64, mu: f64) -> (f64, f64) {
     let length = |mu: f64| spans(height, mu).iter().map(|[a, b]| b - a).sum::<f64>();
     let exact = length(mu);
     let moved = |by: f64| (length((mu + by).clamp(-1.0, 1.0)) - exact).abs();
@@ -143,12 +158,12 @@ fn length_in_slab(height: f64, mu: f64) -> (f64, f64) {
 }
 
 /// Radiance of a wholly opaque, unshadowed slab: ϖ · p · E, with p = 1/4π.
-fn full_radiance(channel: usize) -> f64 {
+pub fn full_radiance(channel: usize) -> f64 {
     ALBEDO[channel] * f64::from(lux::RAW_SUNLIGHT) / (4.0 * PI)
 }
 
 /// Turns the camera and returns each pixel with its ray's slope.
-fn seen_from(app: &mut App, view: &View, (height, pitch): (f32, f32)) -> Vec<(Vec4, DVec3)> {
+pub fn seen_from(app: &mut App, view: &View, (height, pitch): (f32, f32)) -> Vec<(Vec4, DVec3)> {
     let camera = looking(height, pitch);
     app.world_mut().entity_mut(view.camera).insert(camera);
     run_updates(app, 1);
@@ -208,9 +223,9 @@ fn transmittance_and_unshadowed_light_are_exact() {
     assert!(found.twice >= 10 && found.thin > 100, "{found:?}");
 }
 
-/// Single scattering along a ray: ϖ·p·E ∫ σt e^(−σt s) e^(−σt d(s)) ds, with d the slab between the point and the sun;
-/// s counts metres of slab. Midpoint rule, 400 pieces a span (error below 1e-5 here).
-fn single_scattering(height: f64, ray: DVec3, sun: DVec3, extinction: f64) -> f64 {
+/// What a ray gathers of a source along the slab: ∫ σt e^(−σt s) source(σt d(s)) ds, with d the slab between the point
+/// and the sun; s counts metres of slab. Midpoint rule, 400 pieces a span (error below 1e-5 here).
+pub fn gathered(height: f64, ray: DVec3, sun: DVec3, extinction: f64, source: impl Fn(f64) -> f64) -> f64 {
     const PIECES: u32 = 400;
     let (mut passed, mut sum) = (0.0, 0.0);
     for [a, b] in spans(height, ray.y) {
@@ -220,11 +235,16 @@ fn single_scattering(height: f64, ray: DVec3, sun: DVec3, extinction: f64) -> f6
             let up = (p + DVec3::Y * PLANET_RADIUS).normalize();
             let to_sun: f64 = spans(altitude(p, PLANET_RADIUS), up.dot(sun)).iter().map(|[a, b]| b - a).sum();
             let inside = -(-extinction * piece).exp_m1();
-            sum += (-extinction * (passed + to_sun)).exp() * inside;
+            sum += (-extinction * passed).exp() * source(extinction * to_sun) * inside;
             passed += piece;
         }
     }
     sum
+}
+
+/// Of sunlight that is scattered once.
+fn single_scattering(height: f64, ray: DVec3, sun: DVec3, extinction: f64) -> f64 {
+    gathered(height, ray, sun, extinction, |depth| (-depth).exp())
 }
 
 #[test]

@@ -13,7 +13,7 @@ use bevy_cumulus::{ModelShader, prelude::*};
 
 use crate::{
     gpu::{pipelines_are_there, run_until, run_updates},
-    view::{Sky, View, clouds_app_with, read_image, spawn_sun, spawn_view},
+    view::{Sky, View, clouds_app_with, read_image, spawn_sun, spawn_view, until_drawn},
 };
 
 /// What the cameras of this module see where nothing is.
@@ -105,6 +105,30 @@ pub fn without_clouds(app: &mut App, view: &View) -> Vec<Vec3> {
 pub fn enable(app: &mut App, view: &View, enabled: bool) {
     app.world_mut().entity_mut(view.camera).insert(CloudView { enabled, ..default() });
     settle(app);
+}
+
+/// Steps of each pixel's ray, as the picture of [`CloudDebugView::Steps`] tells of them: to half a per cent. For a view
+/// of [`spawn_linear`].
+pub fn steps(app: &mut App, view: &View) -> Vec<f32> {
+    app.world_mut().get_mut::<CloudView>(view.camera).expect("it shows clouds").debug = CloudDebugView::Steps;
+    run_updates(app, 1);
+    until_drawn(app);
+    run_updates(app, 3);
+    let most = 1.0 + app.world().resource::<CloudQuality>().max_steps as f32;
+    let of = |p: &Vec3| {
+        let t = match *p {
+            Vec3 { x, z, .. } if x <= 0.0 => z,
+            Vec3 { x, .. } if x < 1.0 => 1.0 + x,
+            Vec3 { y, .. } if y < 1.0 => 2.0 + y,
+            Vec3 { z, .. } => 3.0 + z,
+        };
+        most.powf(0.25 * t) - 1.0
+    };
+    let counts = linear_pixels(app, view).iter().map(of).collect();
+    app.world_mut().get_mut::<CloudView>(view.camera).expect("it shows clouds").debug = CloudDebugView::None;
+    until_drawn(app);
+    settle(app);
+    counts
 }
 
 /// Spawns an unlit box of one colour.

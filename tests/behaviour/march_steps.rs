@@ -1,0 +1,111 @@
+//! How many steps the march takes, and that what it leaves out is not missed.
+
+use bevy::prelude::*;
+use bevy_cumulus::prelude::*;
+
+use crate::{
+    gpu::run_updates,
+    slab::{exact_march, length_in_slab, seen_from, slab_app},
+    stage::{exact, settle, spawn_linear, steps},
+    view::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
+};
+
+const SIZE: UVec2 = UVec2::new(24, 14);
+
+fn mean(values: impl Iterator<Item = f32> + Clone) -> f32 {
+    values.clone().sum::<f32>() / values.count().max(1) as f32
+}
+
+/// The built-in clouds from the ground, each step where it always is.
+fn built_in() -> (App, View) {
+    let mut app = clouds_app();
+    spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
+    let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()));
+    let view = spawn_linear(&mut app, SIZE, up);
+    until_drawn(&mut app);
+    settle(&mut app);
+    (app, view)
+}
+
+fn seen_with(app: &mut App, view: &View, quality: CloudQuality) -> Vec<Vec4> {
+    app.insert_resource(quality);
+    run_updates(app, 2);
+    cloud_pixels(app, view)
+}
+
+#[test]
+fn long_steps_through_empty_air_miss_nothing() {
+    let (mut app, view) = built_in();
+    // Small steps fall on the same places, whether or not long ones come between.
+    let quality = |long_step| CloudQuality { long_step, step: 60.0, step_growth: 0.0, ..exact(MarchResolution::Full) };
+    let uniform = seen_with(&mut app, &view, quality(1));
+    let uniform_steps = steps(&mut app, &view);
+    let adaptive = seen_with(&mut app, &view, quality(4));
+    let adaptive_steps = steps(&mut app, &view);
+    for (k, (a, b)) in uniform.iter().zip(&adaptive).enumerate() {
+        // The last place of f16: the two shaders' sums may differ by one of f32.
+        assert!((a.w - b.w).abs() <= 1e-3, "pixel {k}: {} and {} pass", a.w, b.w);
+        assert!((a.xyz() - b.xyz()).abs().max_element() <= 1e-3 * a.xyz().max_element(), "pixel {k}: {a} and {b}");
+    }
+    let share = |of: fn(&Vec4) -> bool| uniform.iter().filter(|p| of(p)).count();
+    let (clear, cloudy) = (share(|p| p.w > 0.999), share(|p| p.w < 0.5));
+    assert!(clear > 30 && cloudy > 30, "{clear} clear and {cloudy} cloudy pixels");
+    let open = |steps: &[f32]| mean(uniform.iter().zip(steps).filter(|(p, _)| p.w > 0.999).map(|(_, steps)| *steps));
+    let (uniform_open, adaptive_open) = (open(&uniform_steps), open(&adaptive_steps));
+    println!("{clear} clear pixels: {uniform_open} steps, with long ones {adaptive_open}; {cloudy} cloudy ones");
+    // A quarter where all air is known to be empty; near cloud it is not.
+    assert!(adaptive_open < 0.6 * uniform_open, "{adaptive_open} steps in place of {uniform_open}");
+    assert!(adaptive_open > 0.24 * uniform_open, "{adaptive_open} steps: a long one is four small ones, not more");
+}
+
+#[test]
+fn growing_steps_change_little_with_long_ones() {
+    let (mut app, view) = built_in();
+    // Here small steps fall elsewhere: they are as long as the first of their block.
+    let quality = |long_step| CloudQuality { long_step, step: 40.0, ..exact(MarchResolution::Full) };
+    let [uniform, adaptive] = [1, 4].map(|long_step| seen_with(&mut app, &view, quality(long_step)));
+    let bright = |pixels: &[Vec4]| mean(pixels.iter().map(|p| p.y));
+    let through = |pixels: &[Vec4]| mean(pixels.iter().map(|p| p.w));
+    let (brighter, clearer) = (bright(&adaptive) / bright(&uniform) - 1.0, through(&adaptive) - through(&uniform));
+    let apart = mean(uniform.iter().zip(&adaptive).map(|(a, b)| (a.w - b.w).abs()));
+    println!("brighter by {brighter}, clearer by {clearer}, {apart} apart in the mean");
+    assert!(brighter.abs() < 0.01 && clearer.abs() < 0.01 && apart < 0.01);
+}
+
+#[test]
+fn no_ray_takes_more_steps_than_it_may() {
+    const EXTINCTION: f64 = 1e-3;
+    let (mut app, view) = slab_app(EXTINCTION, Vec3::Y);
+    until_drawn(&mut app);
+    // Twelve samples; and where long steps are tried, the one before the first cloud counts as well.
+    for (long_step, max_steps) in [(1, 12), (4, 13)] {
+        app.insert_resource(CloudQuality { long_step, max_steps, ..exact_march(50.0) });
+        for (seen, ray) in seen_from(&mut app, &view, (10.0, 60.0)) {
+            let length = length_in_slab(10.0, ray.y).0;
+            assert!(length > 700.0, "{length} m: too short to be cut off");
+            let exact = (-EXTINCTION * 12.0 * 50.0).exp();
+            let found = f64::from(seen.w);
+            assert!((found / exact - 1.0).abs() < 2e-3, "long step {long_step}, {ray}: {found} passes, not {exact}");
+        }
+    }
+}
+
+#[test]
+fn the_stop_saves_steps() {
+    const EXTINCTION: f32 = 4e-3;
+    const STOP: f32 = 0.075;
+    let (mut app, _) = slab_app(EXTINCTION.into(), Vec3::Y);
+    let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(45_f32.to_radians()));
+    let view = spawn_linear(&mut app, UVec2::new(8, 6), up);
+    until_drawn(&mut app);
+    let [without, with] = [0.0, STOP].map(|transmittance_stop| {
+        app.insert_resource(CloudQuality { transmittance_stop, max_steps: 512, long_step: 1, ..exact_march(20.0) });
+        run_updates(&mut app, 2);
+        steps(&mut app, &view)
+    });
+    let expected = (-STOP.ln() / (EXTINCTION * 20.0)).ceil();
+    for (k, (with, without)) in with.iter().zip(&without).enumerate() {
+        assert!((with - expected).abs() < 0.5, "ray {k}: {with} steps, not {expected}, of {without}");
+        assert!(*without > 1.4 * expected, "ray {k}: only {without} steps without the stop");
+    }
+}
