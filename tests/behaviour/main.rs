@@ -31,6 +31,7 @@ mod shaders;
 mod slab;
 mod stage;
 mod stall;
+mod steps;
 mod textures;
 mod transparent;
 mod twins;
