@@ -192,6 +192,11 @@ impl Studio {
         second
     }
 
+    /// All that draw into the picture.
+    fn cameras(&self) -> impl Iterator<Item = Entity> + use<> {
+        [Some(self.camera), self.second].into_iter().flatten()
+    }
+
     /// Puts camera, sun and clock where they are in the counted frame `k`.
     fn pose(&mut self, plan: &Plan, k: u32) {
         let (pose, sun) = (plan.camera(k), plan.sun(k).transform());
@@ -268,8 +273,10 @@ impl Studio {
     /// Renders the frames that count, asks for the last one, and waits until it is back.
     fn count_frames(&mut self, plan: &Plan) -> Result<Timings> {
         let mut timings = Timings::default();
-        if let Some(mut view) = self.app.world_mut().get_mut::<CloudView>(self.camera) {
-            view.reset += 1;
+        for camera in self.cameras() {
+            if let Some(mut view) = self.app.world_mut().get_mut::<CloudView>(camera) {
+                view.reset += 1;
+            }
         }
         let stage = Stage::begin("rendering frames", plan.frames.into());
         let mut readback = Vec::new();
@@ -308,8 +315,10 @@ impl Studio {
 
     /// Exposes as the plan says.
     fn expose(&mut self, plan: &Plan) {
-        if let Some(mut exposure) = self.app.world_mut().get_mut::<bevy::camera::Exposure>(self.camera) {
-            exposure.ev100 = plan.ev100;
+        for camera in self.cameras() {
+            if let Some(mut exposure) = self.app.world_mut().get_mut::<bevy::camera::Exposure>(camera) {
+                exposure.ev100 = plan.ev100;
+            }
         }
     }
 

@@ -179,16 +179,16 @@ fn update_field(
                 .and_then(|sky| sky.with_layers(good.layers.clone()))
                 .map_err(|_| CloudFieldError::NotReady)?,
         };
+        let offset = good.model.world_offset;
         let planets: Vec<Planet> = planets
             .iter()
             .map(|(atmosphere, at)| Planet {
-                centre: at.translation().as_dvec3(),
+                centre: at.translation().as_dvec3() + offset,
                 radius: atmosphere.inner_radius.into(),
             })
             .collect();
         // The renderer says what is wrong with one.
         let valid = zones.iter().filter(|(_, zone, _)| zone.validate().is_ok());
-        let offset = good.model.world_offset;
         let zones = valid.filter_map(|(entity, zone, at)| ZoneAt::new(entity, zone, at.translation(), offset));
         sky = sky.with_zones(zones.collect()).with_planets(&planets).with_sun(brightest(&suns)).at(good.clock.seconds);
         Ok(sky)

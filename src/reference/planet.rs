@@ -11,14 +11,15 @@ pub const PLANET_RADIUS: f64 = 6_360_000.0;
 /// A planet of the scene.
 #[derive(Clone, Copy, PartialEq, Debug)]
 pub struct Planet {
-    /// Its centre (world space, m).
+    /// Its centre (m): world space plus [`CloudModel::world_offset`](crate::CloudModel::world_offset), so that a shift of
+    /// the origin does not move it.
     pub centre: DVec3,
     /// Its radius (m).
     pub radius: f64,
 }
 
 impl Default for Planet {
-    /// Where the scene has no `Atmosphere`: [`PLANET_RADIUS`], with the world's origin on its surface.
+    /// Where the scene has no `Atmosphere`: [`PLANET_RADIUS`], with the world's origin on its surface where there is no offset.
     fn default() -> Self {
         Self { centre: DVec3::new(0.0, -PLANET_RADIUS, 0.0), radius: PLANET_RADIUS }
     }

@@ -192,12 +192,13 @@ impl CloudSky {
 
     /// The model in the frame below `eye`, at cloud time `t`.
     fn seen_from(&self, eye: DVec3, t: f64) -> Option<LocalModel<'_, CloudTextureSet>> {
-        let away = |planet: &&Planet| planet.centre.distance_squared(eye);
+        let place = eye + self.model.world_offset;
+        let away = |planet: &&Planet| planet.centre.distance_squared(place);
         let planet = self.planets.iter().min_by(|a, b| away(a).total_cmp(&away(b))).copied().unwrap_or_default();
         if !t.is_finite() {
             return None;
         }
-        let zones = self.zones_around(eye + self.model.world_offset, planet)?;
+        let zones = self.zones_around(place, planet)?;
         let settings = ModelSettings { model: &self.model, layers: &self.layers, zones: &zones };
         LocalModel::of_settings(&settings, t, eye, planet, &self.textures)
     }
@@ -337,6 +338,10 @@ mod tests {
         let model = CloudModel { world_offset: DVec3::new(0.0, 1000.0, 0.0), ..sky.model().clone() };
         let raised = sky.with_model(model).unwrap();
         assert!(raised.is_in_cloud(DVec3::new(0.0, 200.0, 0.0)) && !raised.is_in_cloud(DVec3::new(0.0, 1200.0, 0.0)));
+        // A shift of the origin towards a planet: points of the world come nearer to its own, the planets stay.
+        let model = CloudModel { world_offset: planet.centre, ..raised.model().clone() };
+        let shifted = raised.with_model(model).unwrap();
+        assert!(shifted.is_in_cloud(at(1200.0) - planet.centre) && !shifted.is_in_cloud(at(1200.0)));
     }
 
     #[test]

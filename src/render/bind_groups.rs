@@ -30,6 +30,8 @@ use crate::{model::ModelBindings, textures::CloudTextureViews};
 /// One view's bind groups and pipelines for this frame.
 #[derive(Component)]
 pub(crate) struct CloudBindGroups {
+    /// Whether it is the picture that was asked for that they draw.
+    pub ready: bool,
     /// Group 0 and its dynamic offsets: Bevy's atmosphere, or nothing.
     pub air: BindGroup,
     pub air_offsets: Vec<u32>,
@@ -149,8 +151,8 @@ pub(crate) fn prepare_bind_groups(
             &device,
         );
         match groups {
-            Some((groups, view_ready)) => {
-                ready &= view_ready;
+            Some(groups) => {
+                ready &= groups.ready;
                 commands.entity(item.entity).insert(groups);
             }
             None => {
@@ -162,7 +164,7 @@ pub(crate) fn prepare_bind_groups(
     // What layers read comes after what the thesis's layer does.
     let layers_wait =
         textures.maps_pending || textures.bake_pending && textures.layers_wanted && textures.shape.is_none();
-    status.set_views(ready, !layers_wait);
+    status.set_ready(ready && !layers_wait);
 }
 
 fn view_bind_groups(
@@ -176,7 +178,7 @@ fn view_bind_groups(
     pipelines: &mut CloudPipelines,
     cache: &PipelineCache,
     device: &RenderDevice,
-) -> Option<(CloudBindGroups, bool)> {
+) -> Option<CloudBindGroups> {
     let depth = item.depth.attachment.depth_stencil_views().depth_only_view()?;
     let layout = |d: &BindGroupLayoutDescriptor| cache.get_bind_group_layout(d);
     let air = item.air.as_ref().and_then(|(textures, atmosphere, settings, transform)| {
@@ -292,7 +294,8 @@ fn view_bind_groups(
     };
     let handed_out = |image: Option<AssetId<Image>>| image.and_then(|id| images.get(id));
     let draw = BindGroupEntries::sequential((frame.clone(), &history.resolved));
-    let groups = CloudBindGroups {
+    Some(CloudBindGroups {
+        ready: ids.ready(cache),
         model: model.bind_group(device, cache, &item.uniforms.model, textures)?,
         sky: (
             ids.sky,
@@ -312,6 +315,5 @@ fn view_bind_groups(
         air,
         air_offsets,
         empty,
-    };
-    Some((groups, ids.ready(cache)))
+    })
 }

@@ -82,6 +82,11 @@ pub(crate) fn texel_angle(clip_from_view: Mat4, viewport: UVec4, quality: &Cloud
 }
 
 impl FrameUniform {
+    /// How far is marched (m).
+    pub fn reach(&self) -> f32 {
+        self.limits.z
+    }
+
     pub fn new(input: &FrameInput) -> Self {
         let FrameInput { space, sun, quality, lighting, phases, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();
@@ -148,18 +153,27 @@ impl FrameUniform {
     }
 }
 
-/// How far is marched (m). From the ground `max_distance`; higher up it grows, so that from space all clouds up to the
-/// planet's rim are nearer than where the fade begins.
+/// How far is marched (m). From the ground `max_distance`; higher up it grows, so that from an airliner the lowest clouds
+/// curve over the horizon with no bare ring before it, and from space all clouds up to the planet's rim are nearer than
+/// where the fade begins.
 fn reach(quality: &CloudQuality, lighting: &CloudLighting, space: &TangentFrame) -> f32 {
-    /// Where it begins to grow and where all is seen (m).
-    const GROWS: [f32; 2] = [10_000.0, 60_000.0];
-    /// From the horizon to the far side of the highest clouds there are (m).
-    const PAST_HORIZON: f64 = 400_000.0;
+    /// Where it begins to grow and where low clouds are seen to the horizon (m): between, clouds within `max_distance`
+    /// still hide it, or nearly so.
+    const LOW: [f32; 2] = [2000.0, 12_000.0];
+    /// Where it begins to grow further and where all is seen (m).
+    const ALL: [f32; 2] = [10_000.0, 60_000.0];
+    /// From the horizon to the far side of clouds 2 km up and of the highest there are (m).
+    const PAST_HORIZON: [f64; 2] = [160_000.0, 400_000.0];
     let altitude = space.altitude.max(0.0);
-    let rim = (altitude * (2.0 * space.radius + altitude)).sqrt() + PAST_HORIZON;
-    let all = rim as f32 / lighting.fade_start.clamp(0.1, 0.999);
-    let share = ((altitude as f32 - GROWS[0]) / (GROWS[1] - GROWS[0])).clamp(0.0, 1.0);
-    quality.max_distance.lerp(all.max(quality.max_distance), share * share)
+    let share = |[from, to]: [f32; 2]| ((altitude as f32 - from) / (to - from)).clamp(0.0, 1.0);
+    let horizon = (altitude * (2.0 * space.radius + altitude)).sqrt();
+    let fade_start = lighting.fade_start.clamp(0.1, 0.999);
+    let least = quality.max_distance;
+    let low = (horizon as f32 / fade_start).max((horizon + PAST_HORIZON[0]) as f32).max(least);
+    let all = ((horizon + PAST_HORIZON[1]) as f32 / fade_start).max(least);
+    // By factors: what it is seen to do is how it compares with what is there.
+    let to_horizon = least * (low / least).powf(share(LOW));
+    to_horizon.max(least.lerp(all, share(ALL).powi(2)))
 }
 
 /// Where this frame samples pixel and step.
@@ -211,8 +225,14 @@ mod tests {
             let space = TangentFrame::below(glam::DVec3::Y * (r + altitude), glam::DVec3::ZERO, r).unwrap();
             reach(&quality, &lighting, &space)
         };
-        for low in [-5.0, 2.0, 9_000.0] {
+        for low in [-5.0, 2.0, 1_900.0] {
             assert_eq!(at(low), quality.max_distance);
+        }
+        // From up here there is no bare ring: clouds of 1500 m are marched to where they pass below the horizon.
+        for high in [12e3, 20e3, 40e3_f64] {
+            let r = 6_360_000.0;
+            let [ground, past] = [high, 1500.0].map(|h: f64| (h * (2.0 * r + h)).sqrt());
+            assert!(f64::from(at(high)) > ground + past, "from {high} m: {} m", at(high));
         }
         for high in [60e3, 400e3, 36e6_f64] {
             // Tops of 12 km on the far side of the horizon.

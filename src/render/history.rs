@@ -179,7 +179,7 @@ impl CloudHistory {
 
     /// Which texels this frame marches.
     fn sparse(&self) -> Sparse {
-        Sparse::new(self.key.quality.block_side(), self.frame.index)
+        Sparse::new(self.key.quality.block_side(), self.frame.index, self.key.size)
     }
 
     /// Rays along each side that cover what this frame marches.

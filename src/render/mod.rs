@@ -12,6 +12,7 @@ mod reproject;
 mod status;
 mod versions;
 mod view;
+mod winds;
 mod zones;
 
 use bevy::{

@@ -71,10 +71,11 @@ struct Layer {
 impl Layer {
     /// The lowest deck: things above it are seen through it, and through thin cloud higher up as well.
     fn new(settings: &CloudSettings, atmosphere: Option<&ExtractedAtmosphere>) -> Self {
-        let (centre, radius) = planet(atmosphere);
+        let offset = settings.model.world_offset;
+        let (centre, radius) = planet(atmosphere, offset);
         let decks = decks(&settings.model, settings.layers.shown().map(|(_, layer)| layer));
         let [bottom, top] = decks.first().copied().unwrap_or_default().to_array().map(f64::from);
-        Self { centre: centre - settings.model.world_offset, radius, bottom, top }
+        Self { centre: centre - offset, radius, bottom, top }
     }
 
     fn altitude(&self, place: Vec3) -> f64 {

@@ -10,7 +10,6 @@ use bevy::prelude::*;
 #[derive(Default, Debug)]
 pub(crate) struct SharedStatus {
     views_ready: AtomicBool,
-    views_drawn: AtomicBool,
     unsupported: OnceLock<String>,
 }
 
@@ -41,14 +40,8 @@ impl CloudStatus {
 pub(crate) struct StatusFlags(pub Arc<SharedStatus>);
 
 impl StatusFlags {
-    /// Whether views are drawn, and whether all that they are to show is there.
-    pub fn set_views(&self, drawn: bool, complete: bool) {
-        self.0.views_drawn.store(drawn, Ordering::Release);
-        self.0.views_ready.store(drawn && complete, Ordering::Release);
-    }
-
-    /// Whether the last frame was drawn: only then does it count towards a window.
-    pub fn views_were_drawn(&self) -> bool {
-        self.0.views_drawn.load(Ordering::Acquire)
+    /// Whether all views are drawn with all that they are to show.
+    pub fn set_ready(&self, ready: bool) {
+        self.0.views_ready.store(ready, Ordering::Release);
     }
 }

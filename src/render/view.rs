@@ -16,7 +16,7 @@ use bevy::{
 };
 
 use super::{
-    CloudBuffer, CloudDepth, CloudFrame, CloudNoise, StatusFlags,
+    CloudBuffer, CloudDepth, CloudFrame, CloudNoise,
     bind_groups::{CloudBindGroups, SkyLightBuffer},
     frame::{FrameInput, FrameUniform, Sun, marched_size, texel_angle},
     history::{CloudHistory, HistoryKey},
@@ -24,6 +24,7 @@ use super::{
     pipelines::DrawnInto,
     reproject::{HeldUniform, Pose},
     versions::{Baked, Versions},
+    winds::Winds,
     zones::{ExtractedZones, zones_around},
 };
 use crate::{
@@ -225,6 +226,8 @@ pub(crate) struct PreparedView {
     small: Option<&'static MainPassResolutionOverride>,
     atmosphere: Option<&'static ExtractedAtmosphere>,
     history: Option<&'static mut CloudHistory>,
+    /// Of the last frame.
+    groups: Option<&'static CloudBindGroups>,
     uniforms: Option<&'static mut CloudUniforms>,
 }
 
@@ -244,7 +247,6 @@ pub(crate) fn prepare_views(
     textures: Res<CloudTextureViews>,
     zones: Res<ExtractedZones>,
     mut baked: Local<Baked>,
-    status: Res<StatusFlags>,
     device: Res<RenderDevice>,
     queue: Res<RenderQueue>,
     mut warned: Local<bevy::platform::collections::HashSet<Entity>>,
@@ -276,10 +278,12 @@ pub(crate) fn prepare_views(
             &space,
             sun,
         );
+        // Only a frame that was drawn counts towards a window.
+        let drawn = item.groups.is_some_and(|groups| groups.ready);
         let mut first = None;
         let history = match &mut item.history {
             Some(history) => {
-                history.advance(&device, key, pose, status.views_were_drawn());
+                history.advance(&device, key, pose, drawn);
                 &**history
             }
             None => first.insert(CloudHistory::new(&device, key, pose)),
@@ -301,8 +305,7 @@ pub(crate) fn prepare_views(
             window,
             debug: item.cloud.debug,
         });
-        let reach = f64::from(item.cloud.quality.max_distance);
-        let (around, too_many) = zones_around(&zones.zones, pose.position, &space, reach);
+        let (around, too_many) = zones_around(&zones.zones, pose.position, &space, frame.reach().into());
         if too_many && !*crowded {
             *crowded = true;
             warn!("clouds: camera {} has more than {MAX_ZONES} zones around it; the nearest count", item.entity);
@@ -345,11 +348,14 @@ fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudMode
     (model, settings.layers.clone(), lighting)
 }
 
-/// Centre (world space plus offset, m) and radius (m): those of the scene's atmosphere, else a radius below the world's
-/// origin.
-pub(crate) fn planet(atmosphere: Option<&ExtractedAtmosphere>) -> (DVec3, f64) {
+/// Centre (world space plus offset, m) and radius (m): those of the scene's atmosphere, whose entity is moved as all others
+/// are when the origin shifts, else a radius below where the world's origin is without an offset.
+pub(crate) fn planet(atmosphere: Option<&ExtractedAtmosphere>, offset: DVec3) -> (DVec3, f64) {
     match atmosphere {
-        Some(a) => (a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3(), f64::from(a.inner_radius)),
+        Some(a) => {
+            let centre = a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3();
+            (centre + offset, f64::from(a.inner_radius))
+        }
         // Bevy's default planet.
         None => (DVec3::new(0.0, -PLANET_RADIUS, 0.0), PLANET_RADIUS),
     }
@@ -361,8 +367,9 @@ fn space_below(
     atmosphere: Option<&ExtractedAtmosphere>,
     settings: &CloudSettings,
 ) -> Option<TangentFrame> {
-    let (centre, radius) = planet(atmosphere);
-    let camera = view.world_from_view.translation().as_dvec3() + settings.model.world_offset;
+    let offset = settings.model.world_offset;
+    let (centre, radius) = planet(atmosphere, offset);
+    let camera = view.world_from_view.translation().as_dvec3() + offset;
     TangentFrame::below(camera, centre, radius)
 }
 
@@ -376,10 +383,10 @@ fn window_state(
     let quality = &item.cloud.quality;
     let (view, viewport) = (item.view, item.drawn_viewport());
     let model = &clouds.settings.model;
-    let angle = texel_angle(view.clip_from_view, viewport, quality);
     let altitude = space.altitude as f32;
+    let layers = || clouds.settings.layers.shown().map(|(_, layer)| layer);
     // To the nearest deck.
-    let to_shell = decks(model, clouds.settings.layers.shown().map(|(_, layer)| layer))
+    let to_shell = decks(model, layers())
         .into_iter()
         .map(|deck| (deck.x - altitude).max(altitude - deck.y))
         .fold(f32::INFINITY, f32::min)
@@ -403,11 +410,10 @@ fn window_state(
         sun,
         exposure: item.camera.exposure,
         seconds: clouds.settings.clock.seconds,
-        wind: model.wind.with_y(0.0),
-        rise: model.wind.y.abs() + model.evolution.abs(),
+        winds: Winds::new(model, layers(), altitude),
         outlines: clouds.outline_speed,
         to_shell,
-        texel: angle * to_shell,
+        texel: texel_angle(view.clip_from_view, viewport, quality),
     };
     (key, pose)
 }

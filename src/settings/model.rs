@@ -90,8 +90,9 @@ pub struct CloudModel {
     /// Where the layer is at time zero (m, f64). Transitions keep a sky in place with it. Default 0.
     #[reflect(@-1.0e12..=1.0e12_f32)]
     pub drift: DVec3,
-    /// Position of the world's origin on the planet's map (m, f64): change it when a floating origin shifts.
-    /// Default 0.
+    /// Position of the world's origin on the planet's map (m, f64): change it when a floating origin shifts, by as much as
+    /// all entities are moved back, the `Atmosphere`'s too. That one is 6360 km away, where transforms have steps of half a
+    /// metre: shift by whole metres, and clouds stay where they are. Default 0.
     #[reflect(@-1.0e12..=1.0e12_f32)]
     pub world_offset: DVec3,
 }

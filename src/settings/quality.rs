@@ -51,7 +51,8 @@ pub enum TemporalMode {
     Off,
     /// The thesis's unified TAA (4.5): the mean of the last `window` frames. While the camera stands still that is one
     /// addition and one subtraction; in motion each held frame is reprojected by its own camera, which costs in
-    /// proportion to `window` but far less than a march. What no longer fits is left out. The default.
+    /// proportion to `window` but far less than a march. What no longer fits is left out. A ray to what comes into view or
+    /// was hidden before takes twice the steps; after a cut none does, and single frames show their noise. The default.
     #[default]
     SlidingWindow,
     /// The last picture, reprojected, with `alpha` of the newest frame blended in (Högfeldt 6.1). Two frames of memory;
@@ -120,7 +121,8 @@ pub struct CloudQuality {
     /// Empty small steps in a row after which the march returns to long ones. Default 6.
     #[reflect(@1..=64_u32)]
     pub empty_steps: u32,
-    /// Most steps a ray may take, long and small together. Default 512.
+    /// Steps a ray may take, long and small together: once it has taken half of them, they grow so that the rest reaches to
+    /// its end. Default 512.
     #[reflect(@1..=8192_u32)]
     pub max_steps: u32,
     /// Samples towards the sun for each lit sample (0: the sun is never shadowed). Cost is linear in it. Default 6.
@@ -138,8 +140,9 @@ pub struct CloudQuality {
     /// Samples whose density is below this are skipped (thesis: 0.01). Default 0.002.
     #[reflect(@0.0..=0.9_f32)]
     pub density_skip: f32,
-    /// Cut-off distance (m): nothing is marched beyond. From 10 km up it grows with altitude, so that from space (60 km)
-    /// clouds reach to the planet's rim. Default 90 000.
+    /// Cut-off distance (m): nothing is marched beyond. From 2 km up it grows with altitude, so that from 12 km clouds reach
+    /// past the horizon, and from space (60 km) all do to the planet's rim; steps grow with distance, so that costs some
+    /// dozens of them. Default 90 000.
     #[reflect(@100.0..=2_000_000.0_f32)]
     pub max_distance: f32,
     /// Added to the mip level of all noise: above 0 is smoother and cheaper. Default 0.

@@ -4,16 +4,18 @@ use bevy::{
     camera::{Exposure, Viewport},
     light::light_consts::lux,
     prelude::*,
+    render::render_resource::TextureUsages,
 };
-use bevy_cumulus::prelude::*;
+use bevy_cumulus::{CloudDepth, prelude::*};
 
 use crate::{
     gpu::run_updates,
+    halves::from_half,
     stage::{
         CLEAR, enable, exact, greatest_difference, linear_pixels, render_components, settle, slab_app, spawn_linear,
         without_clouds,
     },
-    view::{View, cloud_pixels, spawn_sun, until_drawn},
+    view::{View, cloud_pixels, read_image, spawn_sun, until_drawn},
 };
 
 const SIZE: UVec2 = UVec2::new(32, 24);
@@ -150,6 +152,45 @@ fn clouds_stay_inside_the_viewport() {
         }
         let published = cloud_pixels(&app, &half);
         assert!(published[0].w < 0.9, "{resolution:?}: the buffer does not start at the viewport's corner");
+    }
+}
+
+#[test]
+fn pictures_of_a_few_texels_are_upscaled_too() {
+    let mut app = slab_app(1500.0, 2500.0, 0.0006);
+    let off = exact(MarchResolution::Full);
+    for size in [UVec2::ONE, UVec2::new(3, 2), UVec2::new(2, 9), UVec2::new(5, 6)] {
+        let view = spawn_linear(&mut app, size, looking(0.0));
+        let mut image = CloudDepth::image(size.x, size.y);
+        image.texture_descriptor.usage |= TextureUsages::COPY_SRC;
+        let depth = app.world_mut().resource_mut::<Assets<Image>>().add(image);
+        app.world_mut().entity_mut(view.camera).insert(CloudDepth(depth.clone()));
+        app.insert_resource(off.clone());
+        until_drawn(&mut app);
+        settle(&mut app);
+        // Where cloud begins, in kilometres.
+        let front = |app: &App| -> Vec<f64> {
+            let texels: Vec<[u16; 4]> = bytemuck::pod_collect_to_vec(&read_image(app, &depth));
+            texels.into_iter().map(|texel| from_half(texel[2])).collect()
+        };
+        let (whole, begins) = (cloud_pixels(&app, &view), front(&app));
+        app.insert_resource(CloudQuality { temporal: TemporalMode::Upscale, block: UpscaleBlock::Four, ..off.clone() });
+        for k in 0..48 {
+            run_updates(&mut app, 1);
+            let (now, fronts) = (cloud_pixels(&app, &view), front(&app));
+            for i in 0..whole.len() {
+                let (now, exact) = (now[i], whole[i]);
+                assert!(now.is_finite() && (now.w - exact.w).abs() < 0.3, "{size}, frame {k}: {now}, {exact} is right");
+                // It is told from the nearest texel that is marched, some degrees off.
+                let off = fronts[i] / begins[i] - 1.0;
+                assert!(off.abs() < 0.3, "{size}, frame {k}: from {} km, {} is right", fronts[i], begins[i]);
+                // Once every texel has been marched nothing is guessed any more.
+                let bright = now.truncate().distance(exact.truncate()) < 0.01 * exact.x;
+                let settled = bright && (now.w - exact.w).abs() < 0.004;
+                assert!(k < 16 || settled, "{size}, frame {k}: {now}, {exact} is right");
+            }
+        }
+        app.world_mut().despawn(view.camera);
     }
 }
 

@@ -33,6 +33,7 @@ mod slab;
 mod slab_settings;
 mod stage;
 mod stall;
+mod steps;
 mod textures;
 mod transparent;
 mod twins;

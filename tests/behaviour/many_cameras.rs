@@ -4,12 +4,12 @@ use bevy::{
     camera::{RenderTarget, Viewport},
     prelude::*,
 };
-use bevy_cumulus::prelude::*;
+use bevy_cumulus::{CloudsPlugin, ModelShader, prelude::*};
 
 use crate::{
     gpu::run_updates,
     stage::{exact, linear_pixels, render_components, settle, slab_app, spawn_box, spawn_linear},
-    view::{Sky, View, clouds_app, shown_pixels, spawn_sun, spawn_view, until_drawn},
+    view::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, shown_pixels, spawn_sun, spawn_view, until_drawn},
 };
 
 const SIZE: UVec2 = UVec2::new(32, 24);
@@ -89,6 +89,50 @@ fn each_eye_of_a_stereo_pair_has_its_own_history() {
     let (eyes, swapped) = (apart(&seen_left, &seen_right), apart(&seen_left, &alone_right));
     println!("{left:.5} and {right:.5} from each eye alone, {eyes:.5} from the other, {swapped:.5}");
     assert!(left.max(right) < 0.02 * eyes.min(swapped), "{left} and {right} from alone, {eyes} from each other");
+}
+
+#[test]
+fn a_view_that_cannot_be_drawn_costs_the_others_no_history() {
+    // Cloud in lumps, so that single frames are noisy. Without `extinction_bound` the path tracer cannot draw it.
+    let lumps = ModelShader(
+        "import package::model::medium::{Medium, empty_medium};
+        fn model_bounds() -> vec2<f32> { return vec2(1000.0, 2000.0); }
+        fn density_bound(p: vec3<f32>, lod: f32) -> f32 { return 1.0; }
+        fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {
+            let lump = sin(p.x * 0.02) + sin(p.y * 0.03) + sin(p.z * 0.02);
+            if lump < 0.5 || p.y < 1000.0 || p.y > 2000.0 { return empty_medium(); }
+            return Medium(1.0, 0.01, vec3(0.99), 0.5, vec2(500.0), vec4(1.0, 0.0, 0.0, 0.0));
+        }"
+        .to_owned(),
+    );
+    let mut app = clouds_app_with((move |app: &mut App| _ = app.insert_resource(lumps.clone()), CloudsPlugin));
+    let quality = CloudQuality { resolution: MarchResolution::Full, step: 200.0, light_steps: 2, ..default() };
+    app.insert_resource(quality.clone());
+    spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
+    let view = spawn_view(&mut app, SIZE, looking(0.0), Sky::Black);
+    until_drawn(&mut app);
+    let filled = |app: &mut App, temporal| {
+        let own = CloudQuality { temporal, ..quality.clone() };
+        let mut shown = app.world_mut().get_mut::<CloudView>(view.camera).unwrap();
+        (shown.quality, shown.reset) = (Some(own), shown.reset + 1);
+        run_updates(app, 12);
+        cloud_pixels(app, &view)
+    };
+    let apart =
+        |a: &[Vec4], b: &[Vec4]| a.iter().zip(b).map(|(a, b)| (a.w - b.w).abs()).sum::<f32>() / a.len() as f32;
+    let alone = filled(&mut app, TemporalMode::SlidingWindow);
+    let single = filled(&mut app, TemporalMode::Off);
+    let noise = apart(&single, &alone);
+    assert!(noise > 0.01, "single frames have no noise: {noise}");
+    let traced = spawn_view(&mut app, SIZE, looking(90.0), Sky::Black);
+    let reference = CloudView { quality: Some(CloudQuality::reference()), ..default() };
+    app.world_mut().entity_mut(traced.camera).insert(reference);
+    settle(&mut app);
+    assert!(!app.world().resource::<CloudStatus>().is_ready(), "the second view is drawn, so nothing is tested");
+    let beside = apart(&filled(&mut app, TemporalMode::SlidingWindow), &alone);
+    println!("{beside:.5} beside it, {noise:.5} if all is lost");
+    // The same frames over again, to the bit.
+    assert!(beside < 1e-6, "{beside} beside it");
 }
 
 #[test]

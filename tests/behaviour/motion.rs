@@ -138,6 +138,47 @@ fn in_motion_a_picture_is_nearly_as_good_as_at_rest() {
 }
 
 #[test]
+fn layers_are_taken_along_with_their_own_wind() {
+    const FRAMES: u32 = 12;
+    let (mut app, view, sun) = sky();
+    // Seconds a frame, and field of view: shapes go some three texels within the window, upwards in the picture.
+    for (name, seconds, fov) in [("Cumulus", 1.0, 0.4), ("Cirrus", 1.0, 0.4)] {
+        let mut preset = CloudPreset::named(name).expect("a built-in preset");
+        for layer in &mut preset.layers.0 {
+            // Whatever is not followed stays as it is.
+            (layer.evolution, layer.renewal) = (0.0, 0.0);
+            layer.map.size = 256;
+        }
+        preset.textures = app.world().resource::<CloudTextures>().clone();
+        preset.lighting = CloudLighting::default();
+        // The hidden layer's wind is nobody's.
+        preset.model.wind = Vec3::ZERO;
+        preset.apply(app.world_mut());
+        let narrow = PerspectiveProjection { fov, ..default() };
+        app.world_mut().entity_mut(view.camera).insert(Projection::Perspective(narrow));
+        run_updates(&mut app, 2);
+        until_drawn(&mut app);
+        let motion = Motion { pitch: 0.8, seconds, ..REST };
+        pose(&mut app, &view, sun, motion, FRAMES - 1);
+        let truth = truth(&mut app, &view, MarchResolution::Full);
+        for temporal in MODES {
+            app.insert_resource(quality(temporal));
+            start_over(&mut app, &view);
+            run_updates(&mut app, FRAMES);
+            let rest = rms(&picture(&app, &view), &truth);
+            start_over(&mut app, &view);
+            for k in 0..FRAMES {
+                pose(&mut app, &view, sun, motion, k);
+                run_updates(&mut app, 1);
+            }
+            let moving = rms(&picture(&app, &view), &truth);
+            println!("{name} {temporal:?}: {rest:.4} at rest, {moving:.4} in motion");
+            assert!(moving < 1.5 * rest, "{name} {temporal:?}: {moving} in motion, {rest} at rest");
+        }
+    }
+}
+
+#[test]
 fn what_a_box_uncovers_is_right_within_four_frames() {
     const SPEED: u32 = 3;
     const SETTLED: u32 = 4;

@@ -168,3 +168,29 @@ fn zones_are_checked_and_followed_without_beginning_anew() {
     run_updates(&mut app, 3);
     assert_eq!(times_logged("more than 8 zones"), logged + 1);
 }
+
+#[test]
+fn a_zone_shows_from_orbit_as_far_as_clouds_do() {
+    let mut app = clouds_app();
+    app.insert_resource(CloudModel { coverage: 0.4, ..default() });
+    spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
+    // Farther along the ground than `max_distance`, and well within what is seen from here.
+    let place = Vec3::new(150_000.0, 0.0, 0.0);
+    let looking = Transform::from_xyz(0.0, 200_000.0, 0.0).looking_at(place, Vec3::Z);
+    let view = spawn_view(&mut app, UVec2::new(9, 9), looking, Sky::Black);
+    let narrow = PerspectiveProjection { fov: 0.03, ..default() };
+    app.world_mut().entity_mut(view.camera).insert(Projection::Perspective(narrow));
+    until_drawn(&mut app);
+    run_updates(&mut app, 4);
+    run_until(&mut app, "the textures are there", 900, |app| !app.world().resource::<CloudTextureStatus>().baking);
+    let thinnest = |app: &mut App| {
+        run_updates(app, 8);
+        cloud_pixels(app, &view).iter().map(|p| p.w).fold(1.0, f32::min)
+    };
+    let before = thinnest(&mut app);
+    let zone = CloudZone { radius: 30_000.0, edge: 1000.0, strength: -1.0 };
+    app.world_mut().spawn((zone, Transform::from_translation(place)));
+    let cleared = thinnest(&mut app);
+    println!("transmittance at least {before} without and {cleared} with it");
+    assert!(before < 0.5 && cleared == 1.0, "{before} and {cleared}");
+}
