@@ -138,7 +138,8 @@ pub struct CloudQuality {
     /// Samples whose density is below this are skipped (thesis: 0.01). Default 0.002.
     #[reflect(@0.0..=0.9_f32)]
     pub density_skip: f32,
-    /// Cut-off distance (m): nothing is marched beyond. From 10 km up it grows with altitude, so that from space (60 km)
+    /// Cut-off distance (m): nothing is marched beyond but high layers (bases from 2500 m on, and some from 2000 m), which
+    /// are seen until they pass below the horizon, at 180 km and more. From 10 km up it grows with altitude, so that from space (60 km)
     /// clouds reach to the planet's rim. Default 90 000.
     #[reflect(@100.0..=2_000_000.0_f32)]
     pub max_distance: f32,
