@@ -37,11 +37,13 @@ const LIBRARY: [(&str, &str); 6] = [
 ];
 
 /// Functions of a model: name, what the renderer calls it with, what it gives, and whether it must be there.
-const FUNCTIONS: [(&str, &str, &str, bool); 6] = [
+const FUNCTIONS: [(&str, &str, &str, bool); 8] = [
     ("model_bounds", "", "vec2<f32>", true),
     ("model_deck", "0u", "vec2<f32>", true),
+    ("model_part", "0u", "vec2<f32>", true),
     ("density_bound", "vec3<f32>(0.0), 0.0", "f32", true),
     ("sample_medium", "vec3<f32>(0.0), 0.0", "Medium", true),
+    ("sample_part", "0u, vec3<f32>(0.0), 0.0", "Medium", true),
     ("extinction_bound", "vec3<f32>(0.0), 0.0", "f32", false),
     ("debug_value", "vec3<f32>(0.0), 0.0, 0u", "f32", false),
 ];

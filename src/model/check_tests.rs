@@ -23,6 +23,8 @@ fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {
     return medium;
 }
 fn model_deck(i: u32) -> vec2<f32> { return model_bounds(); }
+fn model_part(i: u32) -> vec2<f32> { return model_deck(i); }
+fn sample_part(i: u32, p: vec3<f32>, lod: f32) -> Medium { return sample_medium(p, lod); }
 ";
 
 fn verdict(from: &str, to: &str) -> Verdict {

@@ -65,13 +65,23 @@ impl Plugin for CloudModelPlugin {
     }
 }
 
-/// The deck of a model that says nothing of decks.
-const ONE_DECK: &str = "
+/// What a model is given that does not have it: one deck, of which all is one part.
+const GIVEN: [(&str, &str); 3] = [
+    (
+        "model_deck",
+        "
 fn model_deck(i: u32) -> vec2<f32> {
     if i > 0u { return vec2<f32>(1.0, 0.0); }
     return model_bounds();
 }
-";
+",
+    ),
+    ("model_part", "fn model_part(i: u32) -> vec2<f32> { return model_deck(i); }\n"),
+    (
+        "sample_part",
+        "fn sample_part(i: u32, p: vec3<f32>, lod: f32) -> Medium { return sample_medium(p, lod); }\n",
+    ),
+];
 
 fn replace_model(
     source: Res<ModelShader>,
@@ -87,8 +97,11 @@ fn replace_model(
         return;
     }
     let mut text = source.0.clone();
-    if !text.contains("fn model_deck") {
-        text.push_str(ONE_DECK);
+    for (name, given) in GIVEN {
+        if !text.contains(&format!("fn {name}")) {
+            text.push('\n');
+            text.push_str(given);
+        }
     }
     let verdict = check::check(&text, shaders.iter());
     *waits = verdict == check::Verdict::Waits;

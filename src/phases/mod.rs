@@ -18,7 +18,7 @@ pub use asset::{CloudPhaseTable, PhaseTableError};
 use crate::{
     reference::{ice, mie, phase_table::PhaseTable},
     render::PHASE_SLOTS,
-    settings::{CloudPhase, GoodPhases, GoodSettings, KeepGood, PhaseFunction},
+    settings::{CloudPhase, CloudWeather, GoodPhases, GoodSettings, KeepGood, PhaseFunction},
 };
 
 /// A user's tables for phase functions, by slot: the first for [`CloudLighting`](crate::CloudLighting)'s own, the others
@@ -149,6 +149,7 @@ impl Plugin for CloudPhasesPlugin {
 fn update_tables(
     good: Res<GoodSettings>,
     layers: Res<GoodPhases>,
+    weather: Option<Res<CloudWeather>>,
     own: Option<Res<CloudPhaseTables>>,
     assets: Res<Assets<CloudPhaseTable>>,
     mut changes: MessageReader<AssetEvent<CloudPhaseTable>>,
@@ -164,11 +165,17 @@ fn update_tables(
         })
         .collect();
     let lighting = CloudPhase::from(&good.0.lighting);
-    let phases: Vec<&CloudPhase> = std::iter::once(&lighting).chain(&layers.0).take(PHASE_SLOTS).collect();
+    // What the light is mixed of while it changes: in the slots that are left.
+    let light = weather.as_ref().and_then(|weather| weather.light());
+    let others: Vec<CloudPhase> =
+        light.into_iter().flat_map(|light| light.others(&good.0.lighting)).map(|(phase, _)| phase).collect();
+    let phases: Vec<&CloudPhase> =
+        std::iter::once(&lighting).chain(&layers.0).chain(&others).take(PHASE_SLOTS).collect();
     mie.work(None);
     let mut wanted = None;
     for slot in 0..PHASE_SLOTS {
-        let handle = own.as_ref().and_then(|own| own.tables[slot].as_ref());
+        let table = if slot > layers.0.len() { 0 } else { slot };
+        let handle = own.as_ref().and_then(|own| own.tables[table].as_ref());
         let source = phases.get(slot).and_then(|phase| Source::of(phase, handle));
         let has = ready.slots[slot].as_ref().map(|(source, _)| *source);
         let stale = matches!(source, Some(Source::Asset(id)) if changed.contains(&id));

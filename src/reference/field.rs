@@ -29,7 +29,7 @@ pub struct Medium {
     pub albedo: DVec3,
     /// Dimensional profile: 0 at the cloud's envelope, 1 deep inside.
     pub profile: f64,
-    /// Way straight down and up to the ends of the [deck](LocalModel::decks) it lies in (m).
+    /// Way straight down and up to the ends of the layer it lies in (m); the mean by extinction where layers overlap.
     pub span: DVec2,
     /// Shares of the four phase functions in what is scattered here: the light's own and up to three of layers. Their sum
     /// is 1.
@@ -146,9 +146,17 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
     /// The medium at `p`, filtered over 2^`lod` metres.
     pub fn sample_medium(&self, p: DVec3, lod: f64) -> Medium {
         let h = altitude(p, self.frame.radius);
-        let mut sum = if self.has_profile() { self.sample_profile(p, h, lod) } else { Medium::EMPTY };
+        let mut sum = Medium::EMPTY;
+        let own = [self.model.bottom, self.model.top].map(f64::from);
+        if self.has_profile() && h > own[0] && h < own[1] {
+            let one = self.sample_profile(p, h, lod);
+            if one.extinction > 0.0 {
+                sum = Medium { span: DVec2::new(h - own[0], own[1] - h), ..one };
+            }
+        }
         for layer in self.layers() {
-            if h <= f64::from(layer.layer.bottom) || h >= f64::from(layer.layer.top) {
+            let [bottom, top] = [layer.layer.bottom, layer.layer.top].map(f64::from);
+            if h <= bottom || h >= top {
                 continue;
             }
             let one = layer.sample(p, h, lod);
@@ -160,18 +168,12 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
             let share = one.extinction / both;
             sum.albedo = sum.albedo.lerp(one.albedo, share);
             sum.phase = sum.phase.lerp(one.phase, share);
+            sum.span = sum.span.lerp(DVec2::new(h - bottom, top - h), share);
             sum.density += one.density;
             sum.profile = sum.profile.max(one.profile);
             sum.extinction = both;
         }
-        sum.span = self.deck_around(h);
         sum
-    }
-
-    /// Way down and up to the ends of the deck that holds this altitude (m).
-    fn deck_around(&self, h: f64) -> DVec2 {
-        let deck = self.decks().find(|[_, top]| h <= *top);
-        deck.map_or(DVec2::ZERO, |[bottom, top]| DVec2::new(h - bottom, top - h).max(DVec2::ZERO))
     }
 
     fn has_profile(&self) -> bool {

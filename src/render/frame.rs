@@ -4,7 +4,7 @@ use bevy::{prelude::*, render::render_resource::ShaderType};
 
 use super::{
     history::FrameInWindow,
-    phase_slots::{PHASE_SLOTS, PhaseSlots, diffuses},
+    phase_slots::{PHASE_SLOTS, PhaseSlots, diffuses, past_the_first},
 };
 use crate::{
     model::TangentFrame,
@@ -33,7 +33,9 @@ pub(crate) struct FrameInput<'a> {
     pub exposure: f32,
     pub quality: &'a CloudQuality,
     pub lighting: &'a CloudLighting,
-    /// Distance at which high layers pass below the horizon (m): they are never cut off before it.
+    /// Octaves of the light, not always a whole number of them.
+    pub octaves: f32,
+    /// Distance at which high layers pass below the horizon (m): none is shown farther.
     pub highest_horizon: f32,
     pub phases: &'a PhaseSlots,
     pub window: FrameInWindow,
@@ -50,6 +52,7 @@ pub(crate) struct FrameUniform {
     phase_params: [Vec4; PHASE_SLOTS],
     phase_kinds: UVec4,
     phase_fall: Vec4,
+    phase_shift: Vec4,
     first_thinning: Vec4,
     first_eccentricity: Vec4,
     octave_factors: Vec4,
@@ -91,8 +94,8 @@ impl FrameUniform {
         let FrameInput { space, sun, quality, lighting, phases, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();
         let size = marched_size(*viewport, quality);
-        let reach = reach(quality, lighting, space).max(input.highest_horizon);
-        let [first_thinning, first_eccentricity] = phases.first_octave(lighting);
+        let reach = reach(quality, lighting, space);
+        let [first_thinning, first_eccentricity] = phases.first_octave(lighting, input.octaves);
         let held = if quality.is_path_traced() { window.index + 1 } else { window.held_after() };
         Self {
             view_from_clip: input.clip_from_view.inverse(),
@@ -102,6 +105,7 @@ impl FrameUniform {
             phase_params: phases.params(),
             phase_kinds: phases.kinds(),
             phase_fall: phases.fall(),
+            phase_shift: phases.shift(),
             first_thinning,
             first_eccentricity,
             octave_factors: Vec4::new(
@@ -110,17 +114,17 @@ impl FrameUniform {
                 lighting.eccentricity,
                 lighting.phase_limit,
             ),
-            diffusion: diffusion(lighting),
+            diffusion: diffusion(lighting, input.octaves),
             ambient: (lighting.ambient_tint * lighting.ambient_strength).extend(lighting.powder),
             ground_albedo: lighting.ground_albedo.extend(lighting.ambient_desaturation),
-            sky_fallback: lighting.sky_fallback.extend(0.0),
+            // smoothstep is undefined where both edges meet.
+            sky_fallback: lighting.sky_fallback.extend(lighting.fade_start.min(0.999)),
             steps: Vec4::new(quality.step, quality.step_growth, quality.light_step, quality.light_growth),
             limits: Vec4::new(
                 quality.transmittance_stop,
                 quality.density_skip,
+                reach.max(input.highest_horizon),
                 reach,
-                // smoothstep is undefined where both edges meet.
-                reach * lighting.fade_start.min(0.999),
             ),
             offsets: offsets(quality, *window),
             camera: Vec4::new(
@@ -137,7 +141,12 @@ impl FrameUniform {
             ),
             size: UVec4::new(size.x, size.y, quality.divisor(), window.index & 255),
             viewport: *viewport,
-            counts: UVec4::new(quality.max_steps, quality.light_steps, lighting.octaves, phases.count()),
+            counts: UVec4::new(
+                quality.max_steps,
+                quality.light_steps,
+                input.octaves.ceil() as u32,
+                phases.count(),
+            ),
             flags: UVec4::new(
                 quality.long_step,
                 quality.empty_steps,
@@ -153,9 +162,9 @@ impl FrameUniform {
     }
 }
 
-/// How far is marched (m). From the ground `max_distance`; higher up it grows, so that from an airliner the lowest clouds
-/// curve over the horizon with no bare ring before it, and from space all clouds up to the planet's rim are nearer than
-/// where the fade begins.
+/// How far low clouds are shown (m). From the ground `max_distance`; higher up it grows, so that from an airliner the lowest
+/// clouds curve over the horizon with no bare ring before it, and from space all clouds up to the planet's rim are nearer
+/// than where the fade begins.
 fn reach(quality: &CloudQuality, lighting: &CloudLighting, space: &TangentFrame) -> f32 {
     /// Where it begins to grow and where low clouds are seen to the horizon (m): between, clouds within `max_distance`
     /// still hide it, or nearly so.
@@ -196,9 +205,14 @@ fn van_der_corput(i: u32) -> f32 {
     (i.reverse_bits() >> 16) as f32 / 65_536.0
 }
 
-/// Strength and asymmetry of the diffuse light, as `frame.wesl` has them.
-fn diffusion(lighting: &CloudLighting) -> Vec4 {
-    if diffuses(lighting) { Vec4::new(lighting.diffusion, 0.0, lighting.diffusion_asymmetry, 0.0) } else { Vec4::ZERO }
+/// The diffuse light and the last octave, as `frame.wesl` has them.
+fn diffusion(lighting: &CloudLighting, octaves: f32) -> Vec4 {
+    Vec4::new(
+        lighting.diffusion * past_the_first(octaves),
+        1.0 - (octaves.ceil() - octaves),
+        lighting.diffusion_asymmetry,
+        diffuses(lighting, octaves),
+    )
 }
 
 #[cfg(test)]

@@ -53,6 +53,7 @@ impl Plugin for CloudRenderPlugin {
         load_shader_library!(app, "march/debug.wesl");
         load_shader_library!(app, "march/past.wesl");
         load_shader_library!(app, "march/limit.wesl");
+        load_shader_library!(app, "march/far.wesl");
         load_shader_library!(app, "accumulate/held.wesl");
         load_shader_library!(app, "accumulate/around.wesl");
         load_shader_library!(app, "accumulate/reproject.wesl");

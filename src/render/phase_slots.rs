@@ -20,7 +20,7 @@ use crate::{
         phase::{HgDraine, Phase},
         phase_table::{GPU_LENGTH, PhaseTable},
     },
-    settings::{CloudLighting, CloudPhase, PhaseFunction},
+    settings::{CloudLighting, CloudPhase, LightMix, PhaseFunction},
 };
 
 /// Slots that a medium can mix: `Medium::phase` has a share for each.
@@ -59,28 +59,45 @@ impl Slot {
 }
 
 /// The phase functions of a view.
-pub(crate) struct PhaseSlots(Vec<Slot>);
+pub(crate) struct PhaseSlots {
+    slots: Vec<Slot>,
+    /// Of slot 0, in use by others.
+    shift: Vec4,
+}
 
 impl PhaseSlots {
-    /// Slot 0 from the lighting, then one for each of up to three `layers`; more are ignored.
-    pub fn new(lighting: &CloudLighting, layers: &[CloudPhase], tables: &ReadyTables) -> Self {
+    /// Slot 0 from the lighting, then one for each of up to three `layers`, then what else the light is mixed of; more are
+    /// ignored.
+    pub fn new(lighting: &CloudLighting, layers: &[CloudPhase], light: &LightMix, tables: &ReadyTables) -> Self {
         let own = CloudPhase::from(lighting);
-        let all = std::iter::once(&own).chain(layers).take(PHASE_SLOTS).enumerate();
-        Self(all.map(|(slot, phase)| Slot::new(phase, tables.get(slot, phase.function))).collect())
+        let others: Vec<(CloudPhase, f32)> = light.others(lighting).collect();
+        let mut shift = Vec4::ZERO;
+        for (slot, (_, share)) in (1 + layers.len()..PHASE_SLOTS).zip(&others) {
+            shift[slot] = *share;
+            shift.x -= share;
+        }
+        let all = std::iter::once(&own).chain(layers).chain(others.iter().map(|(phase, _)| phase));
+        let slots = all.take(PHASE_SLOTS).enumerate();
+        Self { slots: slots.map(|(slot, phase)| Slot::new(phase, tables.get(slot, phase.function))).collect(), shift }
     }
 
     /// How many are in use, 1 to 4.
     pub fn count(&self) -> u32 {
-        self.0.len() as u32
+        self.slots.len() as u32
+    }
+
+    /// What is added to a medium's shares for all of slot 0's.
+    pub fn shift(&self) -> Vec4 {
+        self.shift
     }
 
     /// Whether any is a table, and light may be turned differently by colour.
     pub fn is_coloured(&self) -> bool {
-        self.0.iter().any(|slot| slot.table.is_some())
+        self.slots.iter().any(|slot| slot.table.is_some())
     }
 
     fn each<T: Copy>(&self, unused: T, of: impl Fn(&Slot) -> T) -> [T; PHASE_SLOTS] {
-        std::array::from_fn(|slot| self.0.get(slot).map_or(unused, &of))
+        std::array::from_fn(|slot| self.slots.get(slot).map_or(unused, &of))
     }
 
     /// Kinds of `phase.wesl`.
@@ -102,18 +119,20 @@ impl PhaseSlots {
     ///
     /// Light in the diffraction peak hardly turns: it reaches deeper, and leaves a little wider. Both shares are fitted
     /// to the path tracer. Single scattering alone (one octave), or the octaves alone (no diffusion), are the thesis's.
-    pub fn first_octave(&self, lighting: &CloudLighting) -> [Vec4; 2] {
-        if !diffuses(lighting) {
-            return [Vec4::ONE; 2];
-        }
-        let peaks = Vec4::from(self.each(0.0, |slot| slot.peak_share() as f32));
+    pub fn first_octave(&self, lighting: &CloudLighting, octaves: f32) -> [Vec4; 2] {
+        let peaks = diffuses(lighting, octaves) * Vec4::from(self.each(0.0, |slot| slot.peak_share() as f32));
         [Vec4::ONE - 0.6 * peaks, Vec4::ONE - 0.02 * peaks]
     }
 }
 
-/// Whether sunlight diffuses: it takes more than one octave.
-pub(crate) fn diffuses(lighting: &CloudLighting) -> bool {
-    lighting.octaves > 1 && lighting.diffusion > 0.0
+/// How much of the second octave there is, 0 to 1: without one no sunlight diffuses.
+pub(crate) fn past_the_first(octaves: f32) -> f32 {
+    (octaves - 1.0).clamp(0.0, 1.0)
+}
+
+/// Whether sunlight diffuses (1) or not (0); in between only where there is next to none of it, so that it may set in.
+pub(crate) fn diffuses(lighting: &CloudLighting, octaves: f32) -> f32 {
+    lighting.diffusion.min(1.0) * past_the_first(octaves)
 }
 
 /// The tables, as `table.wesl` reads them.

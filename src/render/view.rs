@@ -33,7 +33,7 @@ use crate::{
     reference::planet::PLANET_RADIUS,
     settings::{
         CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase, CloudQuality, CloudSettings,
-        CloudView, CloudWeather, GoodPhases, GoodSettings, Validate,
+        CloudView, CloudWeather, GoodPhases, GoodSettings, LightMix, Validate,
     },
     textures::CloudTextureViews,
 };
@@ -44,6 +44,8 @@ pub(crate) struct ExtractedClouds {
     pub settings: CloudSettings,
     /// Phase functions beside the lighting's own.
     phases: Vec<CloudPhase>,
+    /// What of the lighting its fields do not say, while a transition changes it.
+    light: Option<LightMix>,
     pub(super) tables: ReadyTables,
     /// Counts changes that make held frames wrong.
     pub(super) version: u64,
@@ -51,6 +53,14 @@ pub(crate) struct ExtractedClouds {
     pub(super) transitions: u64,
     /// How fast a transition moves outlines (m/s).
     outline_speed: f32,
+}
+
+impl ExtractedClouds {
+    /// Phase functions and octaves of the light as it is shown: a debug view's change of it goes before a transition's.
+    fn light_mix(&self, shown: &CloudLighting) -> LightMix {
+        let same = shown.octaves == self.settings.lighting.octaves && shown.phase == self.settings.lighting.phase;
+        self.light.clone().filter(|_| same).unwrap_or_else(|| shown.into())
+    }
 }
 
 /// A camera that shows clouds.
@@ -116,6 +126,10 @@ pub(crate) fn extract_settings(
     weather: Extract<Option<Res<CloudWeather>>>,
     mut out: ResMut<ExtractedClouds>,
 ) {
+    let light = weather.as_ref().and_then(|weather| weather.light());
+    if out.light.as_ref() != light {
+        out.light = light.cloned();
+    }
     let weather = weather.as_ref().filter(|weather| weather.has_moved());
     out.outline_speed = weather.map_or(0.0, |weather| weather.outline_speed(good.0.clock.seconds) as f32);
     if weather.is_some() {
@@ -290,7 +304,8 @@ pub(crate) fn prepare_views(
         };
         let (window, held) = (history.frame, history.held_uniform());
         let (model, layers, lighting) = shown_settings(&clouds.settings, item.cloud.debug);
-        let phases = PhaseSlots::new(&lighting, &clouds.phases, &clouds.tables);
+        let light = clouds.light_mix(&lighting);
+        let phases = PhaseSlots::new(&lighting, &clouds.phases, &light, &clouds.tables);
         let frame = FrameUniform::new(&FrameInput {
             clip_from_view: item.view.clip_from_view,
             world_from_view: pose.rotation,
@@ -301,6 +316,7 @@ pub(crate) fn prepare_views(
             quality: &item.cloud.quality,
             lighting: &lighting,
             highest_horizon: layers.highest_horizon(space.radius),
+            octaves: light.octaves,
             phases: &phases,
             window,
             debug: item.cloud.debug,

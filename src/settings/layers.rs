@@ -152,7 +152,8 @@ pub struct CloudLayer {
     /// Extinction coefficient of full rain (1/m). Heavy rain 0.002. Default 0.0012.
     #[reflect(@0.0..=0.05_f32)]
     pub rain_extinction: f32,
-    /// How far below `base` the shafts end (m); they dry out towards it. Default 2000.
+    /// How far below `base` the shafts end (m); they dry out towards it. With `rain` below 0.1 they end sooner.
+    /// Default 2000.
     #[reflect(@0.0..=20_000.0_f32)]
     pub rain_depth: f32,
     /// How far the wind carries a drop for each metre that it falls (m/m). Default 0.4.
@@ -233,9 +234,13 @@ impl Default for CloudLayer {
 }
 
 impl CloudLayer {
-    /// Lowest altitude that it reaches, rain included (m). Rain ends at the surface.
+    /// Lowest altitude that it reaches, rain included (m). Rain ends at the surface; where there is hardly any, its shafts
+    /// are shorter, so that rain that sets in grows down from the base.
     pub fn bottom(&self) -> f32 {
-        if self.rain > 0.0 { (self.base - self.rain_depth).max(self.base.min(0.0)) } else { self.base }
+        /// From so much rain on they are `rain_depth` long.
+        const FULL: f32 = 0.1;
+        let depth = self.rain_depth * (self.rain / FULL).clamp(0.0, 1.0);
+        (self.base - depth).max(self.base.min(0.0))
     }
 
     /// Highest altitude that it reaches (m).
@@ -258,13 +263,9 @@ impl CloudLayers {
         self.0.iter().enumerate().filter(|(_, layer)| layer.enabled).take(MAX_LAYERS)
     }
 
-    /// Distance from the ground to where the bases of high layers pass below the horizon (m); 0 without any. Cirrus is seen
-    /// much farther than cumulus, and few long steps show it.
+    /// Distance from the ground to where the last of high layers passes below the horizon (m); 0 without any.
     pub(crate) fn highest_horizon(&self, radius: f64) -> f32 {
-        /// Lower layers end at `quality.max_distance` (m).
-        const HIGH: f32 = 2500.0;
-        let bases = self.shown().map(|(_, layer)| layer.base).filter(|base| *base > HIGH);
-        bases.map(|base| (2.0 * radius * f64::from(base)).sqrt() as f32).fold(0.0, f32::max)
+        self.shown().map(|(_, layer)| horizon_of(layer.bottom(), radius)).fold(0.0, f32::max)
     }
 
     /// The different phase functions of layers that have their own: slots 1 to 3.
@@ -277,6 +278,17 @@ impl CloudLayers {
         }
         phases
     }
+}
+
+/// Distance from the ground to where a high layer of this base passes below the horizon (m): cirrus is seen much farther
+/// than cumulus, and few long steps show it. Lower layers, where this is 0, end at `quality.max_distance`; there is no step
+/// in between, so that a layer may rise. Twin of `shown_until` of `render/march/far.wesl`.
+fn horizon_of(base: f32, radius: f64) -> f32 {
+    /// What counts as low, and as high (m).
+    const HIGH: [f32; 2] = [2000.0, 2500.0];
+    let share = ((base - HIGH[0]) / (HIGH[1] - HIGH[0])).clamp(0.0, 1.0);
+    let horizon = (2.0 * radius * f64::from(base.max(0.0))).sqrt() as f32;
+    horizon * (share * share * (3.0 - 2.0 * share))
 }
 
 impl Validate for CloudLayers {

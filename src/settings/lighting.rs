@@ -88,7 +88,8 @@ pub struct CloudLighting {
     /// Amount of aerial perspective between camera and cloud, with Bevy's atmosphere only (0..1). Default 1.
     #[reflect(@0.0..=1.0_f32)]
     pub aerial_perspective: f32,
-    /// Where the blend with the background begins, as a share of `quality.max_distance`. Default 0.6.
+    /// Where the blend with the background begins, as a share of the distance at which a cloud ends:
+    /// `quality.max_distance`, or a high layer's horizon. Default 0.6.
     #[reflect(@0.0..=1.0_f32)]
     pub fade_start: f32,
 }

@@ -31,6 +31,7 @@ pub use preset::{CloudPreset, PresetError};
 pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
 pub use transition::CloudWeather;
+pub(crate) use transition::LightMix;
 pub use view::{CloudClock, CloudOrder, CloudView};
 pub use zone::CloudZone;
 

@@ -140,9 +140,10 @@ pub struct CloudQuality {
     /// Samples whose density is below this are skipped (thesis: 0.01). Default 0.002.
     #[reflect(@0.0..=0.9_f32)]
     pub density_skip: f32,
-    /// Cut-off distance (m): nothing is marched beyond. From 2 km up it grows with altitude, so that from 12 km clouds reach
-    /// past the horizon, and from space (60 km) all do to the planet's rim; steps grow with distance, so that costs some
-    /// dozens of them. Default 90 000.
+    /// Cut-off distance (m): nothing is marched beyond but high layers (bases from 2500 m on, and some from 2000 m), which
+    /// are seen until they pass below the horizon, at 180 km and more. From 2 km up it grows with altitude, so that from
+    /// 12 km clouds reach past the horizon, and from space (60 km) all do to the planet's rim; steps grow with distance, so
+    /// that costs some dozens of them. Default 90 000.
     #[reflect(@100.0..=2_000_000.0_f32)]
     pub max_distance: f32,
     /// Added to the mip level of all noise: above 0 is smoother and cheaper. Default 0.

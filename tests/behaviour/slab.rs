@@ -393,6 +393,8 @@ fn the_model_knows_nothing_of_the_renderer() {
                     "MOST_DECKS",
                     "model_bounds",
                     "model_deck",
+                    "model_part",
+                    "sample_part",
                     "density_bound",
                     "sample_medium",
                     "empty_medium",

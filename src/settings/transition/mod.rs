@@ -1,5 +1,6 @@
 //! [`CloudWeather`]: the sky changes into another over time.
 
+mod light;
 mod mix;
 mod sky;
 #[cfg(test)]
@@ -7,6 +8,7 @@ mod tests;
 
 use bevy::prelude::*;
 
+pub(crate) use self::light::LightMix;
 use self::{
     mix::Span,
     sky::{Leg, Sky},
@@ -39,8 +41,10 @@ const OUTLINES_MOVE: f64 = 1000.0;
 /// Numbers move evenly and gently; wind changes what moves, never where it is. Layers of one name become one another if they
 /// read the same map and the same noise (scales, stretch) by the same phase function; other old ones dissolve while new ones
 /// form. Where that would be more than eight layers or three phase functions at once, the new ones wait until the old are
-/// gone. [`CloudModel`]'s own layer dissolves and forms again where its scales differ. The lighting's phase function switches
-/// half way. [`CloudTextures`](super::CloudTextures) are not part of it.
+/// gone. [`CloudModel`]'s own layer dissolves and forms again where its scales differ. One phase function of the lighting
+/// turns into another as a mixture of both, and octaves come and go by degrees; the fields name the one there is more of,
+/// and a whole number. (Where layers have three phase functions of their own there is no room for a mixture, and it switches
+/// half way.) [`CloudTextures`](super::CloudTextures) are not part of it.
 ///
 /// Costs: for as long as it lasts, the layers of both skies. Maps of the new sky are made in the background as soon as it is
 /// asked for; a layer stays away until its map is there, so give it a few seconds.
@@ -54,6 +58,9 @@ pub struct CloudWeather {
     /// What was written last.
     #[reflect(ignore)]
     written: Option<Sky>,
+    /// What of the lighting is shown beside its fields; none where they say all.
+    #[reflect(ignore)]
+    light: Option<LightMix>,
     /// Whether this frame shows another sky than the last, by a transition.
     #[reflect(ignore)]
     moved: bool,
@@ -123,6 +130,16 @@ impl CloudWeather {
         self.moved
     }
 
+    /// Whether the lighting is as it was written last, so that what its fields do not say still goes with it.
+    fn keeps_light(&self, lighting: &CloudLighting) -> bool {
+        self.written.as_ref().is_some_and(|sky| sky.lighting == *lighting)
+    }
+
+    /// What of the lighting its fields do not say, while it changes.
+    pub(crate) fn light(&self) -> Option<&LightMix> {
+        self.light.as_ref()
+    }
+
     /// How fast outlines of clouds move by a transition (m/s).
     pub(crate) fn outline_speed(&self, t: f64) -> f64 {
         match self.leg(t) {
@@ -164,8 +181,9 @@ pub(super) fn change_weather(
     lighting: Option<ResMut<CloudLighting>>,
 ) {
     if weather.asked.is_empty() && weather.legs.is_empty() {
-        if weather.moved {
-            weather.moved = false;
+        let stays = lighting.is_some_and(|lighting| weather.keeps_light(&lighting));
+        if weather.moved || (weather.light.is_some() && !stays) {
+            weather.moved = !stays && weather.light.take().is_some();
         }
         return;
     }
@@ -179,10 +197,14 @@ pub(super) fn change_weather(
     if !weather.written.as_ref().is_some_and(|sky| sky.is(&model, &layers, &lighting)) {
         // Somebody else has taken over.
         weather.legs.clear();
+        weather.light = weather.light.take().filter(|_| weather.keeps_light(&lighting));
     }
     weather.moved = false;
     if !weather.asked.is_empty() {
-        let shown = Sky { model: model.clone(), layers: layers.clone(), lighting: lighting.clone() };
+        let mut shown = Sky::new(&model, &layers, &lighting);
+        if let Some(light) = &weather.light {
+            shown.light.clone_from(light);
+        }
         weather.take_in(&shown, clock.seconds);
     }
     let Some(leg) = weather.leg(clock.seconds) else { return };
@@ -192,6 +214,9 @@ pub(super) fn change_weather(
     let model_moved = model.set_if_neq(sky.model.clone());
     let layers_moved = layers.set_if_neq(sky.layers.clone());
     let lighting_moved = lighting.set_if_neq(sky.lighting.clone());
-    weather.moved = (model_moved || layers_moved || lighting_moved) && !is_cut;
+    let light = Some(&sky.light).filter(|light| **light != LightMix::from(&sky.lighting));
+    let light_moved = weather.light.as_ref() != light;
+    weather.light = light.cloned();
+    weather.moved = (model_moved || layers_moved || lighting_moved || light_moved) && !is_cut;
     weather.written = Some(sky);
 }

@@ -2,8 +2,11 @@
 
 use bevy::math::{DVec2, DVec3, Vec3};
 
-use super::mix::{Span, between32, ease, mix};
-use crate::settings::{CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudPreset, MAX_LAYERS, PhaseFunction};
+use super::{
+    light::LightMix,
+    mix::{Span, between32, ease, mix},
+};
+use crate::settings::{CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudPreset, MAX_LAYERS};
 
 /// What a transition changes.
 #[derive(Clone, PartialEq, Debug, Default)]
@@ -11,15 +14,27 @@ pub(crate) struct Sky {
     pub model: CloudModel,
     pub layers: CloudLayers,
     pub lighting: CloudLighting,
+    /// What of the lighting its own fields cannot say while it changes.
+    pub light: LightMix,
 }
 
 impl From<&CloudPreset> for Sky {
     fn from(preset: &CloudPreset) -> Self {
-        Self { model: preset.model.clone(), layers: preset.layers.clone(), lighting: preset.lighting.clone() }
+        Self::new(&preset.model, &preset.layers, &preset.lighting)
     }
 }
 
 impl Sky {
+    /// One that does not change.
+    pub fn new(model: &CloudModel, layers: &CloudLayers, lighting: &CloudLighting) -> Self {
+        Self {
+            model: model.clone(),
+            layers: layers.clone(),
+            lighting: lighting.clone(),
+            light: LightMix::from(lighting),
+        }
+    }
+
     /// Whether both are the same but for where the origin is.
     pub fn is(&self, model: &CloudModel, layers: &CloudLayers, lighting: &CloudLighting) -> bool {
         let moved = CloudModel { world_offset: model.world_offset, ..self.model.clone() };
@@ -47,7 +62,8 @@ impl Leg {
             return self.start.clone();
         }
         let u = self.span.progress(t);
-        Sky { model: self.model(u, t), layers: self.layers(u, t), lighting: self.lighting(ease(u)) }
+        let (lighting, light) = self.lighting(ease(u));
+        Sky { model: self.model(u, t), layers: self.layers(u, t), lighting, light }
     }
 
     fn model(&self, u: f64, t: f64) -> CloudModel {
@@ -113,19 +129,20 @@ impl Leg {
         now
     }
 
-    fn lighting(&self, s: f64) -> CloudLighting {
-        let (a, b) = (&self.start.lighting, &self.target.lighting);
-        let mut now = a.clone();
-        mix(&mut now, b, s);
-        let tabulated = matches!(a.phase, PhaseFunction::Mie | PhaseFunction::Ice | PhaseFunction::Table);
-        if a.phase != b.phase || tabulated {
-            // One function's parameters mean nothing to another, and a table is not made anew for each frame.
-            let of = if s < 0.5 { a } else { b };
-            now.phase = of.phase;
-            (now.g, now.g_back, now.lobe_mix) = (of.g, of.g_back, of.lobe_mix);
-            (now.droplet_diameter, now.halo) = (of.droplet_diameter, of.halo);
+    fn lighting(&self, s: f64) -> (CloudLighting, LightMix) {
+        let (a, b) = (&self.start, &self.target);
+        let mut now = a.lighting.clone();
+        mix(&mut now, &b.lighting, s);
+        if a.light.becomes(&b.light) {
+            let light = LightMix { octaves: a.light.octaves_to(&b.light, s), ..LightMix::from(&now) };
+            return (now, light);
         }
-        now
+        let of = if s < 0.5 { &a.lighting } else { &b.lighting };
+        now.phase = of.phase;
+        (now.g, now.g_back, now.lobe_mix) = (of.g, of.g_back, of.lobe_mix);
+        (now.droplet_diameter, now.halo) = (of.droplet_diameter, of.halo);
+        let light = a.light.crossed(&b.light, s, of);
+        (now, light)
     }
 }
 
