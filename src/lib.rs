@@ -55,8 +55,8 @@ pub use reference::{
 pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
-    CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView, CloudWeather, CloudZone,
-    ModelPhases,
+    CloudPreset, CloudPresetFile, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView,
+    CloudWeather, CloudZone, ModelPhases,
 };
 
 /// What most users need.
@@ -65,8 +65,9 @@ pub mod prelude {
         CloudBuffer, CloudDepth, CloudField, CloudFieldPlugin, CloudSky, CloudStatus, CloudsPlugin,
         settings::{
             CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudMethod, CloudModel, CloudOrder,
-            CloudPhase, CloudPreset, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView,
-            CloudWeather, CloudZone, Erosion, Integration, MarchResolution, PhaseFunction, TemporalMode, UpscaleBlock,
+            CloudPhase, CloudPreset, CloudPresetFile, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures,
+            CloudView, CloudWeather, CloudZone, Erosion, Integration, MarchResolution, PhaseFunction, TemporalMode,
+            UpscaleBlock,
         },
         weather::{WeatherMap, WeatherRecipe},
     };

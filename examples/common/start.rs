@@ -1,8 +1,12 @@
 //! The command line of examples that show a scene: what is in it, from where, and with which settings.
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use anyhow::{Context as _, Result, anyhow, bail};
+use bevy::asset::{
+    AssetPath,
+    io::{AssetSourceId, file::FileAssetReader},
+};
 use bevy_cumulus::prelude::*;
 #[cfg(feature = "metar")]
 use bevy_cumulus::weather::metar::MetarSky;
@@ -52,6 +56,9 @@ pub struct Start {
     /// The scene's name, where one was given.
     pub named: Option<&'static str>,
     pub preset: String,
+    /// The file it was read from, if it was.
+    #[allow(dead_code, reason = "a window reads it again")]
+    pub preset_file: Option<PathBuf>,
     pub settings: CloudSettings,
     /// The settings of each picture of a strip; empty where there is one picture.
     #[allow(dead_code, reason = "a window shows one picture")]
@@ -75,7 +82,10 @@ impl StartOptions {
         };
         #[cfg(not(feature = "metar"))]
         let reported = None;
-        let preset = reported.map_or_else(|| find_preset(preset_name), Ok)?;
+        let (preset, preset_file) = match reported {
+            Some(sky) => (sky, None),
+            None => find_preset(preset_name)?,
+        };
         // A scene has its sun; else the preset's advice is taken.
         let advised = preset.sun_elevation.filter(|_| named.is_none() && (unnamed.is_none() || self.preset.is_some()));
         let elevation = advised.unwrap_or(scene.sun.elevation);
@@ -87,6 +97,7 @@ impl StartOptions {
                 .collect::<Result<_>>()?,
             settings: self.settings(preset, clock, scene, &[])?,
             preset: preset_name.to_owned(),
+            preset_file,
             named: named.map(|scene| scene.name),
             camera: self.camera.unwrap_or(scene.camera),
             sun: self.sun.unwrap_or(SunPose { elevation, ..scene.sun }),
@@ -145,14 +156,30 @@ fn find_scene(name: &str) -> Result<Scene> {
     })
 }
 
-fn find_preset(name: &str) -> Result<CloudPreset> {
+/// A preset by its name or file, and that file.
+fn find_preset(name: &str) -> Result<(CloudPreset, Option<PathBuf>)> {
     if let Some(preset) = CloudPreset::named(name) {
-        return Ok(preset);
+        return Ok((preset, None));
     }
     let path = Path::new(name);
     if path.extension().is_some_and(|extension| extension == "ron") || path.is_file() {
-        return CloudPreset::read(path).context("--preset");
+        return Ok((read_preset(path)?, Some(path.to_owned())));
     }
     let known = CloudPreset::names().collect::<Vec<_>>().join(", ");
     bail!("--preset {name:?}: no such preset; there are {known}, or give a .ron file")
+}
+
+/// Reads a preset whose map files lie in the assets folder.
+pub fn read_preset(path: &Path) -> Result<CloudPreset> {
+    CloudPreset::read_with(path, is_map_there).context("--preset")
+}
+
+/// Looks where Bevy will look.
+fn is_map_there(map: &AssetPath) -> Result<(), String> {
+    let file = FileAssetReader::get_base_path().join("assets").join(map.path());
+    if *map.source() != AssetSourceId::Default || file.is_file() {
+        Ok(())
+    } else {
+        Err(format!("there is no file {}", file.display()))
+    }
 }

@@ -1,6 +1,7 @@
 //! Flies over hills under clouds, in a window: `cargo run --example fly_camera --features inspector`.
 //!
-//! `keys` says what each key does, `overlay` draws help and timings, the panel comes from the crate's inspector.
+//! `keys` says what each key does, `overlay` draws help and timings, `watch` reads the preset's file again when it changes,
+//! the panel comes from the crate's inspector.
 
 #[path = "../common/mod.rs"]
 mod common;
@@ -8,6 +9,7 @@ mod keys;
 mod overlay;
 #[path = "../common/start.rs"]
 mod start;
+mod watch;
 
 use anyhow::Result;
 use bevy::{
@@ -74,6 +76,7 @@ fn fly(options: &Options) -> Result<AppExit> {
     let speed = if settings.clock.speed == 0.0 { 1.0 } else { settings.clock.speed };
     // One over the other they could not be read.
     let panel = !options.bare && options.size.x as f32 >= overlay::BOTH_FROM;
+    let watched = start.preset_file.as_deref().map(watch::PresetWatch::new);
     let flight = Flight { sun: start.sun, presets: keys::Presets::new(), help: !options.bare, speed, start };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }))
@@ -90,8 +93,11 @@ fn fly(options: &Options) -> Result<AppExit> {
         .add_systems(Startup, setup)
         .add_systems(PreUpdate, share_input.after(InputSystems))
         .add_systems(Update, (keys::sky, keys::clock, keys::screen).run_if(keys::free))
-        .add_systems(Update, (take_preset_sun, move_sun).chain().after(keys::sky))
+        .add_systems(Update, (watch::follow, take_preset_sun, move_sun).chain().after(keys::sky))
         .add_systems(EguiPrimaryContextPass, overlay::show);
+    if let Some(watched) = watched {
+        app.insert_resource(watched);
+    }
     Ok(app.run())
 }
 

@@ -129,7 +129,7 @@ impl Options {
     pub fn plan(&self) -> Result<Plan> {
         // Runs must repeat, so real time does not move the clouds.
         let clock = CloudClock { seconds: self.time.unwrap_or(0.0), speed: 0.0 };
-        let Start { scene, named, preset, settings, strip, camera, sun, sky } = self.start.start(None, clock)?;
+        let Start { scene, named, preset, settings, strip, camera, sun, sky, .. } = self.start.start(None, clock)?;
         if !strip.is_empty() {
             let pictures = strip.len() as u32;
             ensure!(

@@ -81,6 +81,22 @@ pub enum SettingsError {
     },
 }
 
+impl SettingsError {
+    /// Paths of the fields that it is about, the one to be changed first.
+    pub(super) fn paths(&self) -> Vec<String> {
+        match self {
+            Self::OutOfRange { field, .. } | Self::NotPowerOfTwo { field, .. } | Self::WrongType { field, .. } => {
+                vec![field.clone()]
+            }
+            Self::InvertedAltitudes { .. } => vec!["model.top".to_owned(), "model.bottom".to_owned()],
+            Self::Inverted { low, high, .. } => vec![high.clone(), low.clone()],
+            // The first that is one too many.
+            Self::TooManyLayers { most, .. } => vec![format!("layers.{most}")],
+            Self::UnknownPath(path) => vec![path.clone()],
+        }
+    }
+}
+
 /// Settings that can say whether they are usable.
 pub trait Validate: Reflect + Sized {
     /// The first segment of the paths of its fields, such as `model`.
@@ -201,6 +217,25 @@ fn numbers(field: &dyn PartialReflect) -> Vec<(&'static str, f64)> {
     } else {
         Vec::new()
     }
+}
+
+/// The range on the field at this path below a type, such as `-1 to 1`; of a vector's parts, the vector's.
+pub(super) fn range_at(info: &'static TypeInfo, path: &str) -> Option<String> {
+    let (name, rest) = path.split_once('.').map_or((path, None), |(name, rest)| (name, Some(rest)));
+    match info {
+        TypeInfo::Struct(info) => {
+            let field = info.field(name)?;
+            range_on(field).or_else(|| range_at(field.type_info()?, rest?))
+        }
+        TypeInfo::TupleStruct(info) => range_at(info.field_at(0)?.type_info()?, path),
+        TypeInfo::List(info) => range_at(info.item_info()?, rest?),
+        _ => None,
+    }
+}
+
+fn range_on(field: &NamedField) -> Option<String> {
+    let whole = field.get_attribute::<RangeInclusive<u32>>().map(|r| format!("{} to {}", r.start(), r.end()));
+    whole.or_else(|| field.get_attribute::<RangeInclusive<f32>>().map(|r| format!("{} to {}", r.start(), r.end())))
 }
 
 fn out_of_range<T: ToString, R: ToString>(field: &str, value: T, min: &R, max: &R) -> SettingsError {

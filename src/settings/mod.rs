@@ -8,6 +8,9 @@ mod model;
 mod paths;
 mod phase;
 mod preset;
+mod preset_error;
+mod preset_file;
+mod preset_lines;
 mod quality;
 mod textures;
 mod transition;
@@ -27,7 +30,9 @@ pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};
 pub(crate) use phase::GoodPhases;
 pub use phase::{CloudPhase, ModelPhases, PhaseFunction};
-pub use preset::{CloudPreset, PresetError};
+pub use preset::CloudPreset;
+pub use preset_error::{PresetError, PresetPlace};
+pub use preset_file::CloudPresetFile;
 pub use quality::{CloudMethod, CloudQuality, Integration, MarchResolution, TemporalMode, UpscaleBlock};
 pub use textures::{CloudTextureSlots, CloudTextures};
 pub use transition::CloudWeather;
@@ -70,6 +75,7 @@ impl Plugin for CloudSettingsPlugin {
             .register_type::<CloudOrder>()
             .register_type::<CloudDebugView>()
             .register_type::<CloudPreset>()
+            .register_type::<CloudPresetFile>()
             .register_type::<CloudPhase>()
             .register_type::<ModelPhases>()
             .register_type::<CloudWeather>()
@@ -79,7 +85,7 @@ impl Plugin for CloudSettingsPlugin {
             .register_type::<Steering>()
             .register_type::<LclFormula>()
             .init_asset::<CloudPreset>()
-            .init_asset_loader::<preset::CloudPresetLoader>()
+            .init_asset_loader::<preset_file::CloudPresetLoader>()
             .add_systems(
                 First,
                 view::advance_clock
@@ -87,7 +93,7 @@ impl Plugin for CloudSettingsPlugin {
                     // As Bevy's own clock is: it rotates messages, and this system has none.
                     .ambiguous_with(bevy::ecs::message::message_update_system),
             )
-            .add_systems(Last, transition::change_weather.before(KeepGood))
+            .add_systems(Last, (preset_file::follow_preset_file, transition::change_weather).chain().before(KeepGood))
             .add_systems(
                 Last,
                 (

@@ -1,13 +1,12 @@
 //! Named skies, and skies from `.ron` files.
 
-use bevy::{
-    asset::{AssetLoader, LoadContext, io::Reader},
-    prelude::*,
-};
-use serde::{Deserialize, Serialize};
-use thiserror::Error;
+use std::path::Path;
 
-use super::{CloudLayers, CloudLighting, CloudModel, CloudTextures, SettingsError, Validate};
+use bevy::{asset::AssetPath, prelude::*};
+use serde::{Deserialize, Serialize};
+
+use super::{CloudLayers, CloudLighting, CloudModel, CloudTextures, PresetError, SettingsError, Validate};
+use crate::textures::weather_maps::asset_path;
 
 /// A sky: what to put into [`CloudModel`], [`CloudLighting`] and [`CloudTextures`]. Quality is not part of it.
 ///
@@ -25,37 +24,12 @@ pub struct CloudPreset {
     /// What the textures are baked from.
     pub textures: CloudTextures,
     /// Elevation of the sun this sky was made for (degrees). Advice: the plugin never moves your light.
+    #[reflect(@LOWEST_SUN..=HIGHEST_SUN)]
     pub sun_elevation: Option<f32>,
 }
 
-/// A preset that cannot be used.
-#[derive(Error, Debug)]
-pub enum PresetError {
-    /// The file cannot be read.
-    #[error("{file}: {source}")]
-    Io {
-        /// The file.
-        file: String,
-        /// Why.
-        source: std::io::Error,
-    },
-    /// The text is not a preset: unknown field, wrong type, or not RON at all; says line and column.
-    #[error("{file}:{source}")]
-    Parse {
-        /// The file.
-        file: String,
-        /// Where and why.
-        source: Box<ron::error::SpannedError>,
-    },
-    /// A field is out of its range.
-    #[error("{file}: {source}")]
-    Settings {
-        /// The file.
-        file: String,
-        /// Which and why.
-        source: SettingsError,
-    },
-}
+const LOWEST_SUN: f32 = -90.0;
+const HIGHEST_SUN: f32 = 90.0;
 
 /// Names and texts of the presets that come with the crate.
 const BUILT_IN: [(&str, &str); 22] = [
@@ -97,31 +71,70 @@ impl CloudPreset {
         Self::parse(text, name).ok()
     }
 
+    /// Checks every field against its range, and fields against each other.
+    ///
+    /// # Errors
+    /// The first field found wrong, with its path, value and range.
+    pub fn validate(&self) -> Result<(), SettingsError> {
+        self.model.validate()?;
+        self.layers.validate()?;
+        self.lighting.validate()?;
+        self.textures.validate()?;
+        match self.sun_elevation {
+            Some(elevation) if !(LOWEST_SUN..=HIGHEST_SUN).contains(&elevation) => Err(SettingsError::OutOfRange {
+                field: "sun_elevation".to_owned(),
+                value: elevation.to_string(),
+                min: LOWEST_SUN.to_string(),
+                max: HIGHEST_SUN.to_string(),
+            }),
+            _ => Ok(()),
+        }
+    }
+
     /// Parses and validates the text of a preset; `file` names it in errors.
     ///
     /// # Errors
-    /// [`PresetError::Parse`] with line and column, or [`PresetError::Settings`] with field and range.
+    /// [`PresetError::Parse`] or [`PresetError::Settings`], with line, column, field and range.
     pub fn parse(text: &str, file: &str) -> Result<Self, PresetError> {
         let options = ron::Options::default().with_default_extension(ron::extensions::Extensions::IMPLICIT_SOME);
-        let preset: Self = options
-            .from_str(text)
-            .map_err(|source| PresetError::Parse { file: file.to_owned(), source: Box::new(source) })?;
-        let named = |source| PresetError::Settings { file: file.to_owned(), source };
-        preset.model.validate().map_err(named)?;
-        preset.layers.validate().map_err(named)?;
-        preset.lighting.validate().map_err(named)?;
-        preset.textures.validate().map_err(named)?;
+        let preset: Self = options.from_str(text).map_err(|error| PresetError::parse(text, file, error))?;
+        preset.validate().map_err(|error| PresetError::settings(text, file, error))?;
         Ok(preset)
     }
 
-    /// Reads a preset from a file.
+    /// Reads a preset from a file. Whether its layers' map files are there is found out when they are loaded; to know it at
+    /// once, see [`read_with`](Self::read_with).
     ///
     /// # Errors
     /// [`PresetError::Io`], or as [`parse`](Self::parse).
-    pub fn read(path: &std::path::Path) -> Result<Self, PresetError> {
+    pub fn read(path: &Path) -> Result<Self, PresetError> {
+        Self::read_with(path, |_| Ok(()))
+    }
+
+    /// Reads a preset from a file, and asks about each map file of a layer that is shown whether it is there. The asset
+    /// server does so itself for presets that it loads.
+    ///
+    /// # Errors
+    /// As [`read`](Self::read), or [`PresetError::Map`] with the answer.
+    pub fn read_with(
+        path: &Path,
+        mut is_there: impl FnMut(&AssetPath<'static>) -> Result<(), String>,
+    ) -> Result<Self, PresetError> {
         let file = path.display().to_string();
         let text = std::fs::read_to_string(path).map_err(|source| PresetError::Io { file: file.clone(), source })?;
-        Self::parse(&text, &file)
+        let preset = Self::parse(&text, &file)?;
+        for (layer, map) in preset.map_files() {
+            asset_path(map)
+                .and_then(|map| is_there(&map))
+                .map_err(|reason| PresetError::map(&text, &file, layer, map, reason))?;
+        }
+        Ok(preset)
+    }
+
+    /// The map files of layers that are shown, with the layers' numbers.
+    pub(super) fn map_files(&self) -> impl Iterator<Item = (usize, &str)> {
+        let read = |layer: &super::CloudLayer| layer.map_image.is_none() && !layer.map_file.is_empty();
+        self.layers.shown().filter(move |(_, layer)| read(layer)).map(|(number, layer)| (number, &*layer.map_file))
     }
 
     /// The text of this preset, to be read by [`parse`](Self::parse).
@@ -135,31 +148,5 @@ impl CloudPreset {
         world.insert_resource(self.layers.clone());
         world.insert_resource(self.lighting.clone());
         world.insert_resource(self.textures.clone());
-    }
-}
-
-/// Loads `*.clouds.ron` files as [`CloudPreset`] assets.
-#[derive(Default, TypePath)]
-pub(crate) struct CloudPresetLoader;
-
-impl AssetLoader for CloudPresetLoader {
-    type Asset = CloudPreset;
-    type Settings = ();
-    type Error = PresetError;
-
-    async fn load(
-        &self,
-        reader: &mut dyn Reader,
-        _settings: &(),
-        context: &mut LoadContext<'_>,
-    ) -> Result<CloudPreset, PresetError> {
-        let file = context.path().to_string();
-        let mut bytes = Vec::new();
-        reader.read_to_end(&mut bytes).await.map_err(|source| PresetError::Io { file: file.clone(), source })?;
-        CloudPreset::parse(&String::from_utf8_lossy(&bytes), &file)
-    }
-
-    fn extensions(&self) -> &[&str] {
-        &["clouds.ron"]
     }
 }

@@ -3,7 +3,10 @@
 //! Each is made by the headless example and compared with `tests/goldens/NAME.png`. After a change of the look that is
 //! meant, `CUMULUS_BLESS=1 cargo test --test behaviour goldens` writes them anew: look at each before it is committed.
 
-use std::{fs, path::PathBuf};
+use std::{
+    fs,
+    path::{Path, PathBuf},
+};
 
 use image::{ImageReader, RgbImage};
 
@@ -25,18 +28,18 @@ const SMALL: [&str; 10] = [
     "--set", "textures.volume_size=32", "--set", "textures.map_size=128",
 ];
 
-fn folder() -> PathBuf {
+pub fn folder() -> PathBuf {
     PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("tests/goldens")
 }
 
 /// A folder of `target` for what failed.
-fn failures() -> PathBuf {
+pub fn failures() -> PathBuf {
     let path = PathBuf::from(env!("CARGO_TARGET_TMPDIR")).join("goldens");
     fs::create_dir_all(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
     path
 }
 
-fn read(path: &std::path::Path) -> Result<RgbImage, String> {
+pub fn read(path: &Path) -> Result<RgbImage, String> {
     let opened = ImageReader::open(path).map_err(|error| error.to_string())?;
     Ok(opened.decode().map_err(|error| error.to_string())?.to_rgb8())
 }
@@ -81,26 +84,32 @@ fn check(name: &str, arguments: &[&str]) {
         return;
     }
     let actual = render(name, arguments);
+    let made = failures().join(format!("{name}.png"));
+    compare_with_golden(name, &actual, &made).unwrap_or_else(|differs| panic!("{differs}"));
+}
+
+/// Compares with the golden picture of this name below the folder, and says what differs; or makes it that one. `made` is
+/// where the picture lies.
+pub fn compare_with_golden(name: &str, actual: &RgbImage, made: &Path) -> Result<(), String> {
     let path = folder().join(format!("{name}.png"));
     if std::env::var("CUMULUS_BLESS").is_ok_and(|bless| bless == "1") {
-        actual.save(&path).unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        return;
+        return actual.save(&path).map_err(|error| format!("{}: {error}", path.display()));
     }
-    let made = failures().join(format!("{name}.png"));
-    let golden = read(&path).unwrap_or_else(|error| {
-        panic!("{}: {error}. Look at {}; CUMULUS_BLESS=1 makes it the golden one", path.display(), made.display())
-    });
-    let alike = compare(&golden, &actual);
-    if !alike.is_some_and(is_alike) {
-        let differs = failures().join(format!("{name}_difference.png"));
-        difference(&golden, &actual).save(&differs).unwrap_or_else(|error| panic!("{}: {error}", differs.display()));
-        panic!(
-            "{name} differs: score and RMS {alike:?}, at least {LEAST_SCORE} and at most {GREATEST_RMS} are allowed; \
-             see {} and {}",
-            made.display(),
-            differs.display()
-        );
+    let golden = read(&path).map_err(|error| {
+        format!("{}: {error}. Look at {}; CUMULUS_BLESS=1 makes it the golden one", path.display(), made.display())
+    })?;
+    let alike = compare(&golden, actual);
+    if alike.is_some_and(is_alike) {
+        return Ok(());
     }
+    let differs = made.with_extension("difference.png");
+    difference(&golden, actual).save(&differs).map_err(|error| format!("{}: {error}", differs.display()))?;
+    Err(format!(
+        "{name} differs: score and RMS {alike:?}, at least {LEAST_SCORE} and at most {GREATEST_RMS} are allowed; see {} \
+         and {}",
+        made.display(),
+        differs.display()
+    ))
 }
 
 macro_rules! goldens {
@@ -115,6 +124,10 @@ macro_rules! goldens {
             let known = [$(stringify!($name)),*];
             for entry in fs::read_dir(folder()).expect("the goldens are there") {
                 let path = entry.expect("the folder can be read").path();
+                if path.is_dir() {
+                    // Those of the presets, which have a test of their own.
+                    continue;
+                }
                 let name = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
                 assert!(known.contains(&name.as_str()), "{} belongs to no test", path.display());
             }

@@ -32,10 +32,10 @@ pub fn binary() -> PathBuf {
 }
 
 /// A new, empty folder for a test's files; gone when the test is.
-struct Folder(PathBuf);
+pub struct Folder(PathBuf);
 
 impl Folder {
-    fn new() -> Self {
+    pub fn new() -> Self {
         static COUNT: AtomicU32 = AtomicU32::new(0);
         let name = format!("cumulus-headless-{}-{}", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed));
         let path = std::env::temp_dir().join(name);
@@ -84,7 +84,7 @@ fn read(path: &Path) -> DynamicImage {
     reader.decode().unwrap_or_else(|error| panic!("{}: {error}", path.display()))
 }
 
-fn read_cloud(path: &Path) -> Rgba32FImage {
+pub fn read_cloud(path: &Path) -> Rgba32FImage {
     match read(path) {
         DynamicImage::ImageRgba32F(image) => image,
         other => panic!("{}: RGBA in 32-bit float expected, found {:?}", path.display(), other.color()),

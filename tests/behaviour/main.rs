@@ -25,6 +25,8 @@ mod path_tracer;
 mod phase_slots;
 mod phase_tables;
 mod phases;
+mod preset_files;
+mod preset_goldens;
 mod sampling_patterns;
 mod schedule;
 mod settings;
