@@ -1,13 +1,14 @@
 //! Bad input is reported by name; the last good value stays, and nothing panics.
 
 use bevy::{
-    camera::RenderTarget,
+    camera::{MainPassResolutionOverride, RenderTarget},
     ecs::component::Mutable,
     prelude::*,
     render::{
         RenderApp, RenderPlugin,
         render_resource::{TextureFormat, TextureUsages, WgpuLimits},
         settings::WgpuSettings,
+        sync_world::RenderEntity,
     },
     window::{WindowRef, WindowResolution},
 };
@@ -15,6 +16,7 @@ use bevy_cumulus::{CloudFrame, prelude::*, settings::SettingsError, settings::Va
 
 use crate::{
     gpu::{headless_plugins, run_until, run_updates, times_logged},
+    modes::{HELD, all, in_mode},
     stage::{CLEAR, exact, linear_pixels, render_components, settle, slab_app, spawn_linear},
     view::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
 };
@@ -254,9 +256,9 @@ fn an_infinite_far_plane_changes_nothing() {
 
 #[test]
 fn a_bad_frame_leaves_no_trace_in_what_is_held() {
-    for temporal in [TemporalMode::SlidingWindow, TemporalMode::Exponential, TemporalMode::Upscale] {
+    for mode in HELD {
         let (mut app, view) = above_one_camera();
-        app.insert_resource(CloudQuality { temporal, offsets: true, ..exact(MarchResolution::Full) });
+        app.insert_resource(in_mode(mode, CloudQuality { offsets: true, ..exact(MarchResolution::Full) }));
         settle(&mut app);
         run_updates(&mut app, 16);
         let before = cloud_pixels(&app, &view);
@@ -268,9 +270,9 @@ fn a_bad_frame_leaves_no_trace_in_what_is_held() {
             app.world_mut().entity_mut(view.camera).insert(bevy::camera::Exposure { ev100: 13.0 });
             run_updates(&mut app, 17);
             for (now, before) in cloud_pixels(&app, &view).iter().zip(&before) {
-                assert!(now.is_finite(), "{temporal:?}: {now}");
+                assert!(now.is_finite(), "{mode:?}: {now}");
                 let off = (*now - *before).abs().max_element() / before.max_element();
-                assert!(off < 0.05, "{temporal:?}: {now}, before {before}");
+                assert!(off < 0.05, "{mode:?}: {now}, before {before}");
             }
         }
     }
@@ -288,6 +290,26 @@ fn a_camera_at_the_planets_centre_shows_no_clouds() {
             app.world_mut().entity_mut(view.camera).insert(looking_up());
         },
     );
+}
+
+#[test]
+fn a_scene_drawn_at_no_size_shows_no_clouds() {
+    is_refused_and_recovers(
+        "no size",
+        true,
+        |app, view| draw_small(app, view, Some(UVec2::ZERO)),
+        |app, view| draw_small(app, view, None),
+    );
+}
+
+/// As an upscaler has it drawn.
+fn draw_small(app: &mut App, view: &View, size: Option<UVec2>) {
+    let entity = app.world().get::<RenderEntity>(view.camera).expect("it is rendered").id();
+    let mut camera = app.sub_app_mut(RenderApp).world_mut().entity_mut(entity);
+    match size {
+        Some(size) => camera.insert(MainPassResolutionOverride(size)),
+        None => camera.remove::<MainPassResolutionOverride>(),
+    };
 }
 
 #[test]
@@ -343,6 +365,47 @@ fn from_any_height_all_numbers_are_finite() {
                 assert!(pixels.iter().all(|p| p.w < 0.9), "{what}: no clouds overhead");
             }
         }
+    }
+}
+
+#[test]
+fn in_the_planet_every_mode_is_finite_and_comes_back() {
+    const FRAMES: u32 = 6;
+    let mut app = clouds_app();
+    spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
+    let view = spawn_linear(&mut app, SIZE, looking_up());
+    until_drawn(&mut app);
+    settle(&mut app);
+    let place = |app: &mut App, height: f32, pitch: f32| {
+        let turned = Quat::from_rotation_x(pitch.to_radians());
+        let placed = Transform::from_xyz(0.0, height, 0.0).with_rotation(turned);
+        app.world_mut().entity_mut(view.camera).insert(placed);
+    };
+    for mode in all() {
+        let quality = CloudQuality { resolution: MarchResolution::Full, step: 200.0, ..CloudQuality::high() };
+        app.insert_resource(in_mode(mode, quality));
+        place(&mut app, 10.0, 35.0);
+        run_updates(&mut app, FRAMES);
+        let before = cloud_pixels(&app, &view);
+        assert!(before.iter().any(|p| p.w < 0.5), "{mode:?}: no clouds");
+        // There at once, and by a dive through the ground at 2000 m/s.
+        let deep = [-3.0, -1000.0, -1e6, -6e6].map(|height| (height, 3));
+        let dive = (0..14).map(|k| (200.0 - 33.3 * k as f32, 1));
+        for pitch in [-90.0, 35.0] {
+            for (height, frames) in deep.into_iter().chain(dive.clone()) {
+                place(&mut app, height, pitch);
+                run_updates(&mut app, frames);
+                let valid = |p: &Vec4| p.is_finite() && p.min_element() >= 0.0 && p.w <= 1.0;
+                assert!(cloud_pixels(&app, &view).iter().all(valid), "{mode:?}: {height} m, {pitch}°");
+                assert!(linear_pixels(&app, &view).iter().all(|p| p.is_finite()), "{mode:?}: {height} m, {pitch}°");
+            }
+        }
+        // A cut, after which frames are those of a new history.
+        place(&mut app, -1e6, 35.0);
+        run_updates(&mut app, 1);
+        place(&mut app, 10.0, 35.0);
+        run_updates(&mut app, FRAMES);
+        assert_eq!(cloud_pixels(&app, &view), before, "{mode:?}: not the same once out again");
     }
 }
 

@@ -144,6 +144,12 @@ goldens! {
     inside: ["--scene", "ground_noon", "--camera", "0,2100,0,40,4"];
     above: ["--scene", "ground_noon", "--camera", "0,7000,0,0,-22"];
     ground_without_sky: ["--scene", "ground_noon", "--no-sky"];
+    between: ["--scene", "between"];
+    // Bevy's sky shows bands from up there.
+    orbit: ["--scene", "orbit", "--no-sky"];
+    limb: ["--scene", "limb", "--no-sky"];
+    hills_in_cloud: ["--scene", "hills_in_cloud"];
+    split_screen: ["--scene", "split_screen"];
     above_without_sky: ["--scene", "sunset", "--camera", "0,6000,0,90,-18", "--no-sky"];
 }
 

@@ -8,7 +8,9 @@ use bevy_cumulus::{CloudsPlugin, ModelShader, prelude::*};
 
 use crate::{
     gpu::run_updates,
-    stage::{exact, linear_pixels, render_components, settle, slab_app, spawn_box, spawn_linear},
+    stage::{
+        CLEAR, exact, greatest_difference, linear_pixels, render_components, settle, slab_app, spawn_box, spawn_linear,
+    },
     view::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, shown_pixels, spawn_sun, spawn_view, until_drawn},
 };
 
@@ -165,9 +167,22 @@ fn a_picture_in_a_picture_has_its_own_quality_and_leaves_the_rest_alone() {
             assert_eq!(*pixel, whole[k], "the small picture changes the large one at {at}");
         }
     }
-    // With a background of its own it shows what the other camera of this quality does.
-    app.world_mut().get_mut::<Camera>(small).unwrap().clear_color = ClearColorConfig::Custom(Color::BLACK);
-    app.world_mut().entity_mut(small).remove::<ChildOf>();
+    // With a background of its own it shows what the other camera of this quality does, and none of another quality.
+    let own = ClearColorConfig::Custom(Color::linear_rgb(CLEAR.x, CLEAR.y, CLEAR.z));
+    app.world_mut().get_mut::<Camera>(small).unwrap().clear_color = own;
+    settle(&mut app);
+    let apart = |app: &App| {
+        let both = linear_pixels(app, &main);
+        greatest_difference(&crop(&both, size.x, corner, SIZE), &expected)
+    };
+    let right = apart(&app);
+    assert!(right < 4e-3, "the small picture is {right} from what its camera sees");
+    let fine = CloudView { quality: Some(exact(MarchResolution::Full)), ..default() };
+    app.world_mut().entity_mut(small).insert(fine);
+    settle(&mut app);
+    let wrong = apart(&app);
+    println!("{right} from its own, {wrong} where its quality is not");
+    assert!(wrong > 10.0 * right.max(1e-3), "its quality does not matter: {wrong} for {right}");
     app.world_mut().despawn(small);
     settle(&mut app);
     assert_eq!(linear_pixels(&app, &main), whole, "the large picture is not the same again");

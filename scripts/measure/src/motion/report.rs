@@ -1,29 +1,36 @@
 //! MOTION.md.
 
-use super::{FRAMES, MODES, Results, Row, STILLS, TARGET};
+use super::{
+    Results,
+    judge::{Judged, Moved, Row},
+    plan::{FLICKER_FRAMES, FLICKERS, MODES},
+};
 use crate::markdown::{maybe, number, table, zoomed};
+
+/// How far a moving frame's FLIP may be above that of the same mode at rest.
+const TARGET: f64 = 0.05;
 
 const HEAD: &str = "# In motion
 
 How well each way of combining frames (`quality.temporal`) holds up while the camera, the sun and the clouds move, how much
-a still picture flickers, and what it costs. Written by `scripts/motion`; edit that, not this file.
+a picture that hardly changes flickers, and what it costs. Written by `scripts/motion`; edit that, not this file.
 ";
 
 const COLUMNS: &str = "
 | Column | Meaning |
 |---|---|
-| at rest | FLIP to a converged still (window of 16), over the cloud: the same mode, nothing moving |
-| moving | the same of the last frame of a motion, against a converged still of that instant |
-| above rest | the difference: what the motion costs. Bold where it is over the target |
-| flicker | how much the first motion's view changes from frame to frame at rest: standard deviation over time of a pixel's brightness as shown, over the mean |
+| at rest | FLIP to a converged still (window of 16), over the cloud: the same mode, nothing moving. Mean over the instants judged |
+| moving | the same of a frame in motion, against a converged still of its instant |
+| above rest | the difference: what the motion costs |
+| worst | the same at the instant where it is greatest. Bold where it is over the target |
 | march, all | GPU time of the march, and of all our passes, in motion (ms a frame) |
 ";
 
 pub fn write(results: &Results) -> String {
     let machine = &results.machine;
     let mut text = format!(
-        "{HEAD}\nMeasured {} at commit {} on {}, {}: pictures of {}{}, preset High, {}60 frames a second, {FRAMES} frames of \
-         motion, {STILLS} frames for flicker, {} min {} s in all. {}\n\nTarget: moving at most {TARGET} above rest. \n{COLUMNS}",
+        "{HEAD}\nMeasured {} at commit {} on {}, {}: pictures of {}{}, preset High, {}60 frames a second, {} min {} s in \
+         all. {}\n\nTarget: moving at most {TARGET} above rest, at every instant.\n{COLUMNS}",
         machine.date,
         machine.commit,
         machine.adapter,
@@ -35,24 +42,57 @@ pub fn write(results: &Results) -> String {
         results.seconds % 60,
         machine.about_times(),
     );
-    for (motion, rows) in &results.motions {
-        text += &format!("\n## {}: {}\n\n", motion.name, motion.what);
-        let lines: Vec<Vec<String>> = MODES.iter().zip(rows).map(|((name, _), row)| line(name, row)).collect();
-        text += &table(&["", "at rest", "moving", "above rest", "flicker", "march", "all"], &lines);
+    for moved in &results.motions {
+        text += &of_motion(moved);
+    }
+    if let Some(flicker) = &results.flicker {
+        text += &of_flicker(flicker);
     }
     text
 }
 
+fn of_motion(Moved { motion, rows, through }: &Moved) -> String {
+    let instants = motion.judged.iter().zip(through).map(|(k, through)| format!("{k} ({})", number(*through)));
+    let lines: Vec<Vec<String>> = MODES.iter().zip(rows).map(|(mode, row)| line(mode.name, row)).collect();
+    format!(
+        "\n## {}: {}\n\nJudged after so many frames (in brackets: mean transmittance of the view): {}.\n\n{}",
+        motion.name,
+        motion.what,
+        instants.collect::<Vec<_>>().join(", "),
+        table(&["", "at rest", "moving", "above rest", "worst", "march", "all"], &lines)
+    )
+}
+
 fn line(name: &str, row: &Row) -> Vec<String> {
-    let above = row.moving - row.still;
-    let above = if above > TARGET { format!("**{}**", number(above)) } else { number(above) };
+    let worst = row.worst().map(|(_, judged)| judged.above_rest());
+    let shown = maybe(worst);
     vec![
         name.to_owned(),
-        number(row.still),
-        number(row.moving),
-        above,
-        maybe(row.flicker),
+        number(row.mean(|judged| judged.still)),
+        number(row.mean(|judged| judged.moving)),
+        number(row.mean(Judged::above_rest)),
+        if worst.is_some_and(|worst| worst > TARGET) { format!("**{shown}**") } else { shown },
         maybe(row.march),
         maybe(row.total),
     ]
+}
+
+fn of_flicker(flicker: &[Vec<f64>]) -> String {
+    let mut text = format!(
+        "\n## Flicker\n\nStandard deviation over {FLICKER_FRAMES} frames in a row of a pixel's brightness as shown, over the \
+         mean brightness. What really moves in that time is far less than a pixel.\n\n| View | |\n|---|---|\n"
+    );
+    for motion in &FLICKERS {
+        text += &format!("| {} | {} |\n", motion.name, motion.what);
+    }
+    let lines: Vec<Vec<String>> = MODES
+        .iter()
+        .enumerate()
+        .map(|(mode, way)| {
+            let values = flicker.iter().map(|view| maybe(view.get(mode).copied()));
+            [way.name.to_owned()].into_iter().chain(values).collect()
+        })
+        .collect();
+    let head: Vec<&str> = [""].into_iter().chain(FLICKERS.iter().map(|motion| motion.name)).collect();
+    text + "\n" + &table(&head, &lines)
 }

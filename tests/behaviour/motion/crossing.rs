@@ -1,0 +1,156 @@
+//! Through cloud and through the layer's shells at 2000 m/s and 60 frames a second: no frame jumps.
+
+use bevy::prelude::*;
+
+use super::{quality, sky, start_over};
+use crate::{
+    gpu::run_updates,
+    modes::{ALONE, Mode, all},
+    view::{View, cloud_pixels},
+};
+
+/// Frames that one is compared with on either side: entering thick cloud takes no more of them.
+const NEAR: usize = 2;
+/// Share of the brightness below which changes do not show.
+const FLOOR: f32 = 1e-3;
+/// Frames at rest before a flight.
+const WARM: u32 = 16;
+
+struct Flight {
+    name: &'static str,
+    from: Vec3,
+    pitch: f32,
+    metres: Vec3,
+    frames: u32,
+}
+
+const FLIGHTS: [Flight; 3] = [
+    // From below the lower shell through cloud and the upper shell to above it, and back; in cloud and out of it.
+    Flight {
+        name: "climb",
+        from: Vec3::new(0.0, 700.0, 0.0),
+        pitch: 0.9,
+        metres: Vec3::new(3.0, 33.2, -4.0),
+        frames: 90,
+    },
+    Flight {
+        name: "descent",
+        from: Vec3::new(0.0, 4200.0, 0.0),
+        pitch: -0.9,
+        metres: Vec3::new(4.0, -33.0, -4.0),
+        frames: 110,
+    },
+    Flight {
+        name: "dash",
+        from: Vec3::new(0.0, 1400.0, 300.0),
+        pitch: 0.7,
+        metres: Vec3::new(0.0, 0.0, -33.3),
+        frames: 120,
+    },
+];
+
+/// Mean luminance of what is seen before a grey sky, in units of that sky's, and mean transmittance.
+fn seen(app: &App, view: &View) -> [f32; 2] {
+    const GREY: f32 = 4000.0;
+    let pixels = cloud_pixels(app, view);
+    let sum = pixels.iter().fold([0.0; 2], |[light, through], p| {
+        let own = p.truncate().dot(Vec3::new(0.2126, 0.7152, 0.0722));
+        [light + own / GREY + p.w, through + p.w]
+    });
+    sum.map(|sum| sum / pixels.len() as f32)
+}
+
+/// What is seen in each frame.
+fn film(app: &mut App, view: &View, flight: &Flight) -> Vec<[f32; 2]> {
+    let place = |app: &mut App, k: u32| {
+        let at = flight.from + flight.metres * k as f32;
+        let turned = Transform::from_translation(at).with_rotation(Quat::from_rotation_x(flight.pitch));
+        app.world_mut().entity_mut(view.camera).insert(turned);
+    };
+    place(app, 0);
+    start_over(app, view);
+    run_updates(app, WARM);
+    let frame = |k| {
+        place(app, k);
+        run_updates(app, 1);
+        seen(app, view)
+    };
+    (0..flight.frames).map(frame).collect()
+}
+
+/// By how much each frame is brighter or darker than the one before.
+fn changes(film: &[[f32; 2]]) -> Vec<f32> {
+    film.windows(2).map(|pair| (pair[1][0] - pair[0][0]).abs()).collect()
+}
+
+/// Each frame's change over what is usual around it: the median of its neighbours' changes, or what does not show.
+/// A sky that itself changes more (`alone`: frames without a past) may be shown to do so.
+fn jumps(changes: &[f32], alone: &[f32], brightness: f32) -> Vec<f32> {
+    let jump = |k: usize| {
+        let mut near = [&changes[k - NEAR..k], &changes[k + 1..=k + NEAR]].concat();
+        near.sort_by(f32::total_cmp);
+        let sky = alone[k - 1..=k + 1].iter().copied().fold(0.0, f32::max);
+        changes[k] / near[NEAR].max(FLOOR * brightness).max(0.5 * sky)
+    };
+    (NEAR..changes.len() - NEAR).map(jump).collect()
+}
+
+/// Most that a frame may change by. Frames alone show the sky itself, which at a cloud's edge, a few frames thick, does
+/// not care.
+fn most(mode: Mode) -> f32 {
+    if mode == ALONE { 3.5 } else { 3.0 }
+}
+
+#[test]
+fn at_2000_m_per_s_no_frame_jumps() {
+    let (mut app, view, _) = sky();
+    let mut bad = Vec::new();
+    for flight in FLIGHTS {
+        let mut alone = vec![0.0; flight.frames as usize];
+        for mode in all() {
+            app.insert_resource(quality(mode));
+            let film = film(&mut app, &view, &flight);
+            let (least, most_through) =
+                film.iter().fold((1.0_f32, 0.0_f32), |(least, most), [_, t]| (least.min(*t), most.max(*t)));
+            let both = least < 0.3 && most_through > 0.9;
+            assert!(both, "{} {mode:?}: not in cloud and out of it: {least} to {most_through}", flight.name);
+            let changes = changes(&film);
+            let brightness = film.iter().map(|[light, _]| light).sum::<f32>() / film.len() as f32;
+            let (mut worst, mut at) = (0.0, 0);
+            for (k, jump) in (NEAR..).zip(jumps(&changes, &alone, brightness)) {
+                if jump > worst {
+                    (worst, at) = (jump, k);
+                }
+                if jump > most(mode) {
+                    let around = &changes[k - NEAR..=k + NEAR];
+                    bad.push(format!(
+                        "{} {mode:?}: frame {k} changes by {jump:.2} times those around: {around:?}",
+                        flight.name
+                    ));
+                }
+            }
+            println!("{} {mode:?}: frame {at} changes by {worst:.2} times what those around do", flight.name);
+            if mode == ALONE {
+                alone = changes;
+            }
+        }
+    }
+    assert!(bad.is_empty(), "{bad:#?}");
+}
+
+#[test]
+fn explore_tmp() {
+    let Ok(text) = std::env::var("M2_FLIGHTS") else { return };
+    let (mut app, view, _) = sky();
+    for line in text.split(';') {
+        let n: Vec<f32> = line.split(',').map(|w| w.trim().parse().unwrap()).collect();
+        let flight = Flight { name: "x", from: Vec3::new(n[0], n[1], n[2]), pitch: n[3], metres: Vec3::new(n[4], n[5], n[6]), frames: n[7] as u32 };
+        app.insert_resource(quality(ALONE));
+        let film = film(&mut app, &view, &flight);
+        let changes = changes(&film);
+        let brightness = film.iter().map(|[light, _]| light).sum::<f32>() / film.len() as f32;
+        let alone = vec![0.0; film.len()];
+        let j = jumps(&changes, &alone, brightness);
+        println!("{line}: worst {:.2} {:.2?}\n {:.2?}", j.iter().fold(0.0_f32, |a, b| a.max(*b)), j.iter().enumerate().filter(|(_, j)| **j > 2.0).collect::<Vec<_>>(), film.iter().map(|f| f[1]).collect::<Vec<_>>());
+    }
+}
