@@ -6,6 +6,7 @@
 mod common;
 mod keys;
 mod overlay;
+mod presets;
 #[path = "../common/start.rs"]
 mod start;
 
@@ -51,7 +52,7 @@ struct Flight {
     start: Start,
     /// Its elevation runs on past 90°, over the zenith and down on the other side: 360° are a day.
     sun: common::SunPose,
-    presets: keys::Presets,
+    presets: presets::Presets,
     help: bool,
     /// Speed of the cloud clock when it is not paused.
     speed: f32,
@@ -74,7 +75,7 @@ fn fly(options: &Options) -> Result<AppExit> {
     let speed = if settings.clock.speed == 0.0 { 1.0 } else { settings.clock.speed };
     // One over the other they could not be read.
     let panel = !options.bare && options.size.x as f32 >= overlay::BOTH_FROM;
-    let flight = Flight { sun: start.sun, presets: keys::Presets::new(), help: !options.bare, speed, start };
+    let flight = Flight { sun: start.sun, presets: presets::Presets::new(), help: !options.bare, speed, start };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }))
         .add_plugins((FreeCameraPlugin, FrameTimeDiagnosticsPlugin::default(), RenderDiagnosticsPlugin))
