@@ -48,7 +48,7 @@ pub fn sky(
     keys: Keys,
     time: Res<Time>,
     mut flight: ResMut<Flight>,
-    mut model: ResMut<CloudModel>,
+    (mut model, mut layers): (ResMut<CloudModel>, ResMut<CloudLayers>),
     mut lighting: ResMut<CloudLighting>,
     mut textures: ResMut<CloudTextures>,
     mut quality: ResMut<CloudQuality>,
@@ -67,49 +67,17 @@ pub fn sky(
         quality.set_if_neq(chosen);
     }
     if keys.just_pressed(KeyCode::KeyP)
-        && let Some(next) = flight.presets.next(&model, &lighting)
+        && let Some(next) = flight.presets.next(&model, &layers, &lighting)
     {
         if let Some(elevation) = next.sun_elevation {
             flight.sun.elevation = elevation;
         }
-        model.set_if_neq(next.model);
-        lighting.set_if_neq(next.lighting);
-        textures.set_if_neq(next.textures);
+        next.apply_to(&mut model, &mut layers, &mut lighting, &mut textures);
     }
 }
 
 /// Names of the quality presets, in the order of their keys.
 pub const QUALITIES: [&str; 4] = ["low", "medium", "high", "ultra"];
-
-/// The built-in presets, parsed once, and the one chosen last.
-pub struct Presets {
-    all: Vec<(&'static str, CloudPreset)>,
-    last: usize,
-}
-
-impl Presets {
-    /// All presets; the last of them counts as chosen, so that the first is next.
-    pub fn new() -> Self {
-        let all: Vec<_> = CloudPreset::names().filter_map(|name| Some((name, CloudPreset::named(name)?))).collect();
-        Self { last: all.len().saturating_sub(1), all }
-    }
-
-    fn index(&self, model: &CloudModel, lighting: &CloudLighting) -> Option<usize> {
-        self.all.iter().position(|(_, preset)| preset.model == *model && preset.lighting == *lighting)
-    }
-
-    /// The preset in use, unless something has been changed since.
-    pub fn name(&self, model: &CloudModel, lighting: &CloudLighting) -> Option<&'static str> {
-        Some(self.all[self.index(model, lighting)?].0)
-    }
-
-    /// The preset after the one in use, or after the one chosen last.
-    fn next(&mut self, model: &CloudModel, lighting: &CloudLighting) -> Option<CloudPreset> {
-        let current = self.index(model, lighting).unwrap_or(self.last);
-        self.last = (current + 1).checked_rem(self.all.len())?;
-        Some(self.all[self.last].1.clone())
-    }
-}
 
 /// Pause and single step of the cloud clock.
 pub fn clock(keys: Keys, mut flight: ResMut<Flight>, mut clock: ResMut<CloudClock>) {

@@ -7,6 +7,7 @@
 mod common;
 mod keys;
 mod overlay;
+mod presets;
 #[path = "../common/start.rs"]
 mod start;
 mod watch;
@@ -53,7 +54,7 @@ struct Flight {
     start: Start,
     /// Its elevation runs on past 90°, over the zenith and down on the other side: 360° are a day.
     sun: common::SunPose,
-    presets: keys::Presets,
+    presets: presets::Presets,
     help: bool,
     /// Speed of the cloud clock when it is not paused.
     speed: f32,
@@ -77,7 +78,7 @@ fn fly(options: &Options) -> Result<AppExit> {
     // One over the other they could not be read.
     let panel = !options.bare && options.size.x as f32 >= overlay::BOTH_FROM;
     let watched = start.preset_file.as_deref().map(watch::PresetWatch::new);
-    let flight = Flight { sun: start.sun, presets: keys::Presets::new(), help: !options.bare, speed, start };
+    let flight = Flight { sun: start.sun, presets: presets::Presets::new(), help: !options.bare, speed, start };
     let mut app = App::new();
     app.add_plugins(DefaultPlugins.set(WindowPlugin { primary_window: Some(window), ..default() }))
         .add_plugins((FreeCameraPlugin, FrameTimeDiagnosticsPlugin::default(), RenderDiagnosticsPlugin))

@@ -21,6 +21,7 @@ pub struct Shown<'w, 's> {
     flight: Res<'w, Flight>,
     store: Res<'w, DiagnosticsStore>,
     model: Res<'w, CloudModel>,
+    layers: Res<'w, CloudLayers>,
     lighting: Res<'w, CloudLighting>,
     quality: Res<'w, CloudQuality>,
     clock: Res<'w, CloudClock>,
@@ -105,7 +106,7 @@ fn lines(shown: &Shown) -> Vec<String> {
         lines.push(format!("baking {:.0} %", shown.baking.progress * 100.0));
     }
     let quality = QUALITIES.into_iter().find(|name| CloudQuality::named(name).as_ref() == Some(&*shown.quality));
-    let preset = shown.flight.presets.name(&shown.model, &shown.lighting);
+    let preset = shown.flight.presets.name(&shown.model, &shown.layers, &shown.lighting);
     lines.push(format!("preset {}, quality {}", preset.unwrap_or("your own"), quality.unwrap_or("your own")));
     lines.push(format!("coverage {:+.2}, sun at {:.0}°", shown.model.coverage, shown.flight.sun.elevation));
     let paused = if shown.clock.speed == 0.0 { ", paused" } else { "" };

@@ -101,7 +101,7 @@ impl PresetState {
 
 /// Whether the presets make the same sky; the sun is the scene's.
 fn is_same(a: &CloudPreset, b: &CloudPreset) -> bool {
-    a.model == b.model && a.layers == b.layers && a.lighting == b.lighting && a.textures == b.textures
+    a.is_sky(&b.model, &b.layers, &b.lighting) && a.textures == b.textures
 }
 
 /// Writes a preset that can be read again.

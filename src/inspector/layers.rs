@@ -34,7 +34,7 @@ const GROUPS: [(&str, &[&str]); 7] = [
             "turbulence_scale",
         ],
     ),
-    ("Light", &["density", "extinction", "albedo", "own_phase", "phase"]),
+    ("Light", &["density", "extinction", "albedo", "own_phase", "phase", "phase_file"]),
     ("Rain", &["rain", "rain_extinction", "rain_depth", "rain_slant"]),
     ("Wind", &["wind", "wind_skew", "evolution", "renewal", "drift", "renewal_drift"]),
 ];

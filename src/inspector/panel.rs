@@ -120,10 +120,7 @@ fn presets_ui(ui: &mut Ui, shown: &mut Shown, state: &mut PanelState) {
         return;
     };
     if let Some(preset) = state.presets.ui(ui, &current(model, layers, lighting, textures, shown.lights.iter())) {
-        model.set_if_neq(preset.model.clone());
-        layers.set_if_neq(preset.layers.clone());
-        lighting.set_if_neq(preset.lighting.clone());
-        textures.set_if_neq(preset.textures.clone());
+        preset.apply_to(model, layers, lighting, textures);
         shown.chosen.write(CloudPresetChosen(preset));
     }
 }

@@ -7,7 +7,7 @@ use glam::DVec2;
 
 use super::{TangentFrame, uniform::wrapped};
 use crate::{
-    settings::{CloudLayer, CloudModel, CloudPhase, LayerKind, MAX_LAYERS},
+    settings::{CloudLayer, CloudModel, LayerKind, MAX_LAYERS, OwnPhase},
     weather::SWIRL_SIZE,
 };
 
@@ -97,7 +97,7 @@ impl LayerUniform {
         seconds: f64,
         frame: &TangentFrame,
         sizes: &LayerSizes,
-        phases: &[CloudPhase],
+        phases: &[OwnPhase],
     ) -> Self {
         let wind = DVec2::new(layer.wind.x.into(), layer.wind.z.into());
         let drift = DVec2::new(layer.drift.x, layer.drift.z);
@@ -124,7 +124,7 @@ impl LayerUniform {
         // The same way whatever the wind: one that turns must not sweep what has passed over the map since time zero.
         let renewed = at - RENEWS * (layer.renewal_drift + f64::from(layer.renewal) * seconds);
         let wave = |k: usize| (renewed.dot(WAVES[k]) / scale + place(k as u32) * TAU).rem_euclid(TAU) as f32;
-        let own_phase = phases.iter().position(|phase| layer.own_phase && *phase == layer.phase);
+        let own_phase = layer.its_phase().and_then(|own| phases.iter().position(|phase| *phase == own));
         let phase = own_phase.map_or(0, |slot| slot as u32 + 1);
         let texel = |scale: f32, size: u32| (scale / size.max(1) as f32).log2();
         Self {
@@ -162,7 +162,7 @@ impl LayerUniform {
             rain_extinction: layer.rain_extinction,
             far: Vec2::new(layer.far_start, layer.far_end),
             lean: downwind.as_vec2() * layer.wind_skew,
-            rain_lean: downwind.as_vec2() * layer.rain_slant,
+            rain_lean: if layer.rain > 0.0 { downwind.as_vec2() * layer.rain_slant } else { Vec2::ZERO },
             along: along.as_vec2(),
             map_offset: Vec4::new(own.x, own.y, 0.0, 0.0),
             shape_offset: if is_sheet { Vec4::new(fibres.x, fibres.y, 0.0, 0.0) } else { volume(layer.shape_scale, 5) },

@@ -28,7 +28,8 @@ const MODEL_PATH: &str = "embedded://bevy_cumulus/model/model.wesl";
 /// Insert it before adding [`CloudsPlugin`](crate::CloudsPlugin), or at any time later; bind group 1 stays as the
 /// built-in model declares it, and a model need not use any of it. The source must define the three functions of
 /// `bevy_cumulus::model::medium`'s comment. It is compiled on the CPU before it is shown: one that does not compile is logged
-/// with its line and told as [`ModelShaderError`], and the last good model stays, which is the built-in one at first.
+/// with its line and told as [`ModelShaderError`], and the last good model stays, which is the built-in one at first. Remove
+/// the resource, and the built-in model is back.
 #[derive(Resource, Clone, Debug)]
 pub struct ModelShader(pub String);
 
@@ -44,7 +45,15 @@ pub struct ModelShaderError {
 
 /// The model's module: one asset for as long as the app lives, so that whatever it holds, pipelines follow.
 #[derive(Resource)]
-struct ModelModule(Handle<Shader>);
+pub(crate) struct ModelModule {
+    shader: Handle<Shader>,
+    /// Whether it holds a user's model.
+    pub is_custom: bool,
+}
+
+fn built_in() -> Shader {
+    Shader::from_wesl(include_str!("model.wesl"), MODEL_PATH)
+}
 
 pub(crate) struct CloudModelPlugin;
 
@@ -57,11 +66,10 @@ impl Plugin for CloudModelPlugin {
         load_shader_library!(app, "profile.wesl");
         load_shader_library!(app, "layer.wesl");
         // Not loaded as an embedded asset: that would come later, and could take the place of a user's module.
-        let built_in = Shader::from_wesl(include_str!("model.wesl"), MODEL_PATH);
-        let module = app.world_mut().resource_mut::<Assets<Shader>>().add(built_in);
-        app.insert_resource(ModelModule(module))
+        let shader = app.world_mut().resource_mut::<Assets<Shader>>().add(built_in());
+        app.insert_resource(ModelModule { shader, is_custom: false })
             .add_message::<ModelShaderError>()
-            .add_systems(PreUpdate, replace_model.run_if(resource_exists::<ModelShader>));
+            .add_systems(PreUpdate, replace_model);
     }
 }
 
@@ -84,14 +92,21 @@ fn model_deck(i: u32) -> vec2<f32> {
 ];
 
 fn replace_model(
-    source: Res<ModelShader>,
-    module: Res<ModelModule>,
+    source: Option<Res<ModelShader>>,
+    mut module: ResMut<ModelModule>,
     mut shaders: ResMut<Assets<Shader>>,
     mut loaded: MessageReader<AssetEvent<Shader>>,
     mut errors: MessageWriter<ModelShaderError>,
     mut waits: Local<bool>,
 ) {
     let more = loaded.read().any(|event| matches!(event, AssetEvent::Added { .. } | AssetEvent::Modified { .. }));
+    let Some(source) = source else {
+        *waits = false;
+        if module.is_custom {
+            put(&mut module, &mut shaders, built_in(), false);
+        }
+        return;
+    };
     let asked = source.is_changed() || *waits && more;
     if !asked {
         return;
@@ -112,10 +127,13 @@ fn replace_model(
             error!("clouds: {error}; the last good model stays");
             errors.write(error);
         }
-        check::Verdict::Good => {
-            if shaders.insert(module.0.id(), Shader::from_wesl(text, MODEL_PATH)).is_err() {
-                error!("clouds: the model's shader asset is gone; the model was not replaced");
-            }
-        }
+        check::Verdict::Good => put(&mut module, &mut shaders, Shader::from_wesl(text, MODEL_PATH), true),
+    }
+}
+
+fn put(module: &mut ModelModule, shaders: &mut Assets<Shader>, shader: Shader, is_custom: bool) {
+    module.is_custom = is_custom;
+    if shaders.insert(module.shader.id(), shader).is_err() {
+        error!("clouds: the model's shader asset is gone; the model was not replaced");
     }
 }

@@ -1,10 +1,13 @@
 //! Phase functions that are tables: computed in the background, or a user's own.
 //!
 //! [`PhaseFunction::Mie`] and [`PhaseFunction::Ice`] are computed when they are first asked for;
-//! [`PhaseFunction::Table`] reads [`CloudPhaseTables`]. Until a table is there, the one of the same kind before it stays,
-//! or else what [`Phase::of`](crate::reference::phase::Phase::of) gives.
+//! [`PhaseFunction::Table`] reads a layer's file, or [`CloudPhaseTables`]. Until a table is there, the one of the same kind
+//! before it stays, or else what [`Phase::of`](crate::reference::phase::Phase::of) gives.
 
 mod asset;
+mod files;
+#[cfg(test)]
+mod tests;
 
 use std::sync::Arc;
 
@@ -15,14 +18,17 @@ use bevy::{
 
 pub use asset::{CloudPhaseTable, PhaseTableError};
 
+use self::files::TableFiles;
 use crate::{
     reference::{ice, mie, phase_table::PhaseTable},
     render::PHASE_SLOTS,
     settings::{CloudPhase, CloudWeather, GoodPhases, GoodSettings, KeepGood, PhaseFunction},
 };
 
-/// A user's tables for phase functions, by slot: the first for [`CloudLighting`](crate::CloudLighting)'s own, the others
-/// for layers'. Read where the slot's function is [`PhaseFunction::Table`]. Default none.
+/// A user's tables for phase functions, by slot: the first for [`CloudLighting`](crate::CloudLighting)'s own, the others for
+/// [`ModelPhases`](crate::ModelPhases)', or layers' different ones in the order of the list. Read where the slot's function is
+/// [`PhaseFunction::Table`]. Default none. A layer's own file, [`CloudLayer::phase_file`](crate::CloudLayer::phase_file), goes
+/// before its slot's table, and stays with the layer wherever it is in the list.
 ///
 /// Load them as assets (`*.phase.csv`, see [`CloudPhaseTable`]) or add them in code. One that does not load is reported
 /// with file and line, and the last good one stays.
@@ -138,6 +144,7 @@ impl Plugin for CloudPhasesPlugin {
             .init_resource::<CloudPhaseStatus>()
             .init_resource::<ReadyTables>()
             .init_resource::<MieTables>()
+            .init_resource::<TableFiles>()
             .register_type::<CloudPhaseTables>()
             .register_type::<CloudPhaseStatus>()
             .init_asset::<CloudPhaseTable>()
@@ -153,6 +160,8 @@ fn update_tables(
     own: Option<Res<CloudPhaseTables>>,
     assets: Res<Assets<CloudPhaseTable>>,
     mut changes: MessageReader<AssetEvent<CloudPhaseTable>>,
+    mut files: ResMut<TableFiles>,
+    server: Option<Res<AssetServer>>,
     mut mie: ResMut<MieTables>,
     mut ready: ResMut<ReadyTables>,
     mut status: ResMut<CloudPhaseStatus>,
@@ -173,9 +182,10 @@ fn update_tables(
         std::iter::once(&lighting).chain(&layers.0).chain(&others).take(PHASE_SLOTS).collect();
     mie.work(None);
     let mut wanted = None;
+    files.follow(&good.0.layers, server.as_deref(), &assets);
     for slot in 0..PHASE_SLOTS {
         let table = if slot > layers.0.len() { 0 } else { slot };
-        let handle = own.as_ref().and_then(|own| own.tables[table].as_ref());
+        let handle = files.of_slot(slot).or_else(|| own.as_ref().and_then(|own| own.tables[table].as_ref()));
         let source = phases.get(slot).and_then(|phase| Source::of(phase, handle));
         let has = ready.slots[slot].as_ref().map(|(source, _)| *source);
         let stale = matches!(source, Some(Source::Asset(id)) if changed.contains(&id));

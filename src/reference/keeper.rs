@@ -10,8 +10,7 @@ use thiserror::Error;
 
 use super::{planet::Planet, query::CloudSky};
 use crate::{
-    ModelShader,
-    model::ZoneAt,
+    model::{ModelModule, ZoneAt},
     render::CloudStatus,
     settings::{CloudZone, GoodSettings, KeepGood, Validate},
     textures::{CloudTextureSlot, CloudTextureStatus, cpu_copies::CpuCopies, readback, weather_maps},
@@ -55,7 +54,7 @@ pub enum CloudFieldError {
     /// The textures are still being baked or read back, or layers' first maps are being made. Wait.
     #[error("the cloud textures are not on the CPU yet")]
     NotReady,
-    /// A [`ModelShader`] is in the built-in model's place, and the CPU cannot run it.
+    /// A [`ModelShader`](crate::ModelShader) is in the built-in model's place, and the CPU cannot run it.
     #[error("the clouds are those of a ModelShader, which the CPU cannot run")]
     CustomModel,
     /// An image in a slot can be read neither on the GPU nor in the main world.
@@ -139,15 +138,13 @@ fn update_field(
     good: Option<Res<GoodSettings>>,
     (textures, maps): (Option<Res<CloudTextureStatus>>, Option<Res<weather_maps::LayerMaps>>),
     status: Option<Res<CloudStatus>>,
-    shader: Option<Res<ModelShader>>,
+    module: Option<Res<ModelModule>>,
     planets: Query<(&Atmosphere, &GlobalTransform)>,
     zones: Query<(Entity, &CloudZone, &GlobalTransform)>,
     suns: Suns,
-    mut custom: Local<bool>,
     mut field: ResMut<CloudField>,
 ) {
-    // Once replaced, the built-in model does not come back.
-    *custom |= shader.is_some();
+    let custom = module.is_some_and(|module| module.is_custom);
     let baking = textures.is_none_or(|textures| textures.baking);
     let has_layers = good.as_ref().is_some_and(|good| good.0.layers.shown().next().is_some());
     let maps = maps.as_ref().map(|maps| maps.published());
@@ -156,7 +153,7 @@ fn update_field(
     let awaits_layers = has_layers && (awaits_maps || set.as_ref().is_ok_and(|set| set.layers.is_none()));
     field.current = !baking && !awaits_layers && copies.are_current();
     field.sky = (|| {
-        if *custom {
+        if custom {
             return Err(CloudFieldError::CustomModel);
         }
         if let Some(reason) = status.as_ref().and_then(|status| status.unsupported()) {

@@ -59,7 +59,12 @@ impl<T: ModelTextures> Layer<'_, T> {
             return 0.0;
         }
         let m = self.leaned(p, h);
-        let wide = reach * (1.0 + f64::from(layer.skew));
+        let mut skew = f64::from(layer.skew);
+        // Above the base shafts slant nothing.
+        if h - reach < f64::from(layer.base) {
+            skew = skew.max(layer.rain_lean.as_dvec2().length());
+        }
+        let wide = reach * (1.0 + skew);
         let coarse = (wide.log2() + 1.0 - f64::from(layer.texels.x)).ceil().max(0.0);
         let at = self.map_place(m);
         let mut most = self.read_map(at, coarse).w.max(self.read_map(at + OTHER, coarse).w);
@@ -83,7 +88,7 @@ impl<T: ModelTextures> Layer<'_, T> {
         let base = f64::from(layer.base) + f64::from(layer.base_rise) * w.z;
         let x = (h - base) / (f64::from(layer.thickness) * w.y).max(1.0);
         if x <= 0.0 {
-            let fall = self.rain_at(p, h, base, w.x, lod);
+            let fall = self.rain_at(m, h, base, w.x, lod);
             return Medium {
                 density: fall,
                 extinction: fall * f64::from(layer.rain_extinction),
@@ -182,11 +187,17 @@ impl<T: ModelTextures> Layer<'_, T> {
         w
     }
 
-    /// Map position with the lean of tops taken out (m).
+    /// Map position with the lean of tops taken out, and below the lowest base, where only rain is, the slant of its shafts
+    /// (m).
     fn leaned(&self, p: DVec3, h: f64) -> DVec2 {
         let layer = self.layer;
-        let height = (h - f64::from(layer.base)) / f64::from(layer.thickness);
-        map_position(p, self.radius) - layer.lean.as_dvec2() * height
+        let above = h - f64::from(layer.base);
+        let slant = if above < 0.0 {
+            layer.rain_lean.as_dvec2() * -above
+        } else {
+            layer.lean.as_dvec2() * (-above / f64::from(layer.thickness))
+        };
+        map_position(p, self.radius) + slant
     }
 
     /// Displacement by the curl field, most at the base (m).
@@ -264,13 +275,12 @@ impl<T: ModelTextures> Layer<'_, T> {
         mix(fibres, cells, layer.wispiness.into())
     }
 
-    /// Shafts that hang from the base.
-    fn rain_at(&self, p: DVec3, h: f64, base: f64, coverage: f64, lod: f64) -> f64 {
+    /// Shafts that hang from the base, from its place `m`.
+    fn rain_at(&self, m: DVec2, h: f64, base: f64, coverage: f64, lod: f64) -> f64 {
         let layer = self.layer;
         if layer.rain <= 0.0 || h >= base || coverage <= 0.0 {
             return 0.0;
         }
-        let m = map_position(p, self.radius) + layer.rain_lean.as_dvec2() * (base - h);
         let streaks = self.swirl(m, lod).z;
         let bottom = f64::from(layer.bottom);
         let left = ((h - bottom) / (base - bottom).max(1.0)).clamp(0.0, 1.0);

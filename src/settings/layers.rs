@@ -3,7 +3,7 @@
 use bevy::{math::DVec3, prelude::*};
 use serde::{Deserialize, Serialize};
 
-use super::{CloudPhase, SettingsError, Validate};
+use super::{CloudPhase, PhaseFunction, SettingsError, Validate};
 use crate::weather::WeatherRecipe;
 
 /// Most layers that are shown at once.
@@ -33,7 +33,7 @@ pub enum MapChannels {
     Green,
     /// B is coverage.
     Blue,
-    /// A is coverage.
+    /// A is coverage. One that is full everywhere is taken for a picture without alpha, which is an error.
     Alpha,
 }
 
@@ -53,7 +53,8 @@ pub struct CloudLayer {
     pub kind: LayerKind,
     /// The map, made from numbers. Changing one makes it again in the background; the old one stays until then.
     pub map: WeatherRecipe,
-    /// Path of an image asset in the recipe's place; it tiles over `map.scale`. Hot-reloaded. Default none.
+    /// Path of an image asset in the recipe's place: PNG, KTX2 (not compressed) or, with the feature `exr`, which is on by
+    /// default, EXR. It tiles over `map.scale`. Hot-reloaded. Default none.
     pub map_file: String,
     /// An image in the recipe's place, and in the file's: set in code. Default none.
     #[serde(skip)]
@@ -142,10 +143,14 @@ pub struct CloudLayer {
     #[reflect(@0.0..=1.0_f32)]
     pub albedo: Vec3,
     /// Whether `phase` is used in place of [`CloudLighting`](super::CloudLighting)'s phase function. Layers may have three
-    /// different ones of their own; what is more takes the light's. Default false.
+    /// different ones of their own; what is more takes the light's, with a warning. Default false.
     pub own_phase: bool,
     /// The layer's own phase function.
     pub phase: CloudPhase,
+    /// Path of the table that [`PhaseFunction::Table`] reads, an asset (`*.phase.csv`, see
+    /// [`CloudPhaseTable`](crate::CloudPhaseTable)). Hot-reloaded. Default none: that of its slot in
+    /// [`CloudPhaseTables`](crate::CloudPhaseTables).
+    pub phase_file: String,
     /// Precipitation (0..1): a thicker, darker base and shafts of rain below it. Default 0.
     #[reflect(@0.0..=1.0_f32)]
     pub rain: f32,
@@ -156,7 +161,7 @@ pub struct CloudLayer {
     /// Default 2000.
     #[reflect(@0.0..=20_000.0_f32)]
     pub rain_depth: f32,
-    /// How far the wind carries a drop for each metre that it falls (m/m). Default 0.4.
+    /// How far shafts trail behind the cloud for each metre that drops fall, into slower air (m/m). Default 0.4.
     #[reflect(@0.0..=10.0_f32)]
     pub rain_slant: f32,
     /// Wind velocity (m/s, world axes; y moves the noise upward). Default (8, 0, 3).
@@ -219,6 +224,7 @@ impl Default for CloudLayer {
             albedo: Vec3::splat(0.9995),
             own_phase: false,
             phase: CloudPhase::default(),
+            phase_file: String::new(),
             rain: 0.0,
             rain_extinction: 0.0012,
             rain_depth: 2000.0,
@@ -243,11 +249,28 @@ impl CloudLayer {
         (self.base - depth).max(self.base.min(0.0))
     }
 
+    /// Its own phase function, if it has one.
+    pub(crate) fn its_phase(&self) -> Option<OwnPhase<'_>> {
+        let file = if self.phase.function == PhaseFunction::Table { self.phase_file.trim() } else { "" };
+        self.own_phase.then_some(OwnPhase { phase: self.phase, file })
+    }
+
     /// Highest altitude that it reaches (m).
     pub fn top(&self) -> f32 {
         self.base + self.base_rise + self.thickness
     }
 }
+
+/// A layer's own phase function; layers with equal ones share a slot.
+#[derive(Clone, Copy, PartialEq, Debug)]
+pub(crate) struct OwnPhase<'a> {
+    pub phase: CloudPhase,
+    /// Of its table; empty for that of the slot.
+    pub file: &'a str,
+}
+
+/// Phase functions of their own that layers may have at once.
+pub(crate) const MAX_OWN_PHASES: usize = 3;
 
 /// Weather-map layers, in any order; up to [`MAX_LAYERS`]. They add to [`CloudModel`](super::CloudModel)'s own layer.
 ///
@@ -269,14 +292,20 @@ impl CloudLayers {
     }
 
     /// The different phase functions of layers that have their own: slots 1 to 3.
-    pub(crate) fn phases(&self) -> Vec<CloudPhase> {
+    pub(crate) fn phases(&self) -> Vec<OwnPhase<'_>> {
         let mut phases = Vec::new();
-        for (_, layer) in self.shown().filter(|(_, layer)| layer.own_phase) {
-            if phases.len() < 3 && !phases.contains(&layer.phase) {
-                phases.push(layer.phase);
+        for own in self.shown().filter_map(|(_, layer)| layer.its_phase()) {
+            if phases.len() < MAX_OWN_PHASES && !phases.contains(&own) {
+                phases.push(own);
             }
         }
         phases
+    }
+
+    /// The first layer whose own phase function is one too many, and its place.
+    pub(crate) fn without_slot(&self) -> Option<(usize, &CloudLayer)> {
+        let slots = self.phases();
+        self.shown().find(|(_, layer)| layer.its_phase().is_some_and(|own| !slots.contains(&own)))
     }
 }
 

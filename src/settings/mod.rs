@@ -25,6 +25,7 @@ pub use check::{SettingsError, Validate};
 pub use debug::CloudDebugView;
 pub(crate) use debug::DebugShader;
 pub use layers::{CloudLayer, CloudLayers, LayerKind, MAX_LAYERS, MapChannels};
+pub(crate) use layers::{MAX_OWN_PHASES, OwnPhase};
 pub use lighting::CloudLighting;
 pub use model::{CloudModel, Erosion};
 pub use paths::{CloudSettings, snake_case};

@@ -3,7 +3,7 @@
 use bevy::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::{CloudLighting, GoodSettings, check::check_ranges};
+use super::{CloudLighting, GoodSettings, MAX_OWN_PHASES, check::check_ranges};
 
 /// The angular distribution of scattered light. Each integrates to 1 over the sphere.
 #[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Debug, Default)]
@@ -30,7 +30,8 @@ pub enum PhaseFunction {
     Mie,
     /// The ice crystals of cirrus, rough ones, with a 22° halo of strength `halo`. Octaves after the first have no halo.
     Ice,
-    /// A table of your own, from [`CloudPhaseTables`](crate::CloudPhaseTables); in octaves after the first
+    /// A table of your own, from [`CloudLayer::phase_file`](crate::CloudLayer::phase_file) or
+    /// [`CloudPhaseTables`](crate::CloudPhaseTables); in octaves after the first
     /// Henyey–Greenstein with the table's asymmetry. Until it is loaded, Henyey–Greenstein with `g`.
     Table,
 }
@@ -97,6 +98,7 @@ pub(crate) fn keep_good_phases(
     settings: Res<GoodSettings>,
     mut good: ResMut<GoodPhases>,
     mut own: Local<Vec<CloudPhase>>,
+    mut told: Local<Option<String>>,
 ) {
     if let Some(phases) = phases.filter(|phases| phases.is_changed()) {
         let wrong =
@@ -107,6 +109,16 @@ pub(crate) fn keep_good_phases(
         }
     }
     let layers = &settings.0.layers;
-    let now = if layers.0.is_empty() { own.clone() } else { layers.phases() };
+    let slots = layers.phases().into_iter().map(|slot| slot.phase);
+    let now = if layers.0.is_empty() { own.clone() } else { slots.collect() };
     good.set_if_neq(GoodPhases(now));
+    let left = layers.without_slot().map(|(i, layer)| format!("layers.{i}.phase ({:?})", layer.name));
+    if *told != left {
+        if let Some(left) = &left {
+            warn!(
+                "clouds: {left} takes the light's phase function: layers may have {MAX_OWN_PHASES} different ones of their own"
+            );
+        }
+        *told = left;
+    }
 }

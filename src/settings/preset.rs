@@ -149,4 +149,23 @@ impl CloudPreset {
         world.insert_resource(self.lighting.clone());
         world.insert_resource(self.textures.clone());
     }
+
+    /// As [`apply`](Self::apply), in a system that has the settings. What is so already does not count as changed.
+    pub fn apply_to(
+        &self,
+        model: &mut ResMut<CloudModel>,
+        layers: &mut ResMut<CloudLayers>,
+        lighting: &mut ResMut<CloudLighting>,
+        textures: &mut ResMut<CloudTextures>,
+    ) {
+        model.set_if_neq(self.model.clone());
+        layers.set_if_neq(self.layers.clone());
+        lighting.set_if_neq(self.lighting.clone());
+        textures.set_if_neq(self.textures.clone());
+    }
+
+    /// Whether these settings are this sky. Its sun and what textures are baked from do not count.
+    pub fn is_sky(&self, model: &CloudModel, layers: &CloudLayers, lighting: &CloudLighting) -> bool {
+        self.model == *model && self.layers == *layers && self.lighting == *lighting
+    }
 }

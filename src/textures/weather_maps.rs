@@ -51,6 +51,14 @@ struct Entry {
     map: Option<Arc<WeatherMap>>,
 }
 
+/// What a layer shows.
+struct Shown {
+    name: String,
+    asked: Source,
+    /// The map that it asks for, or its last good one until that is made.
+    map: Option<(Source, Arc<WeatherMap>)>,
+}
+
 /// The maps of all layers, by their place in [`CloudLayers`](crate::settings::CloudLayers).
 #[derive(Resource, Default)]
 pub(crate) struct LayerMaps {
@@ -60,8 +68,8 @@ pub(crate) struct LayerMaps {
     revisions: bevy::platform::collections::HashMap<AssetId<Image>, u32>,
     /// What is wrong with an image, told once.
     told: Vec<Source>,
-    /// What each layer shows: the map that it asks for, or the last good one until that is made.
-    shown: [Option<(Source, Arc<WeatherMap>)>; MAX_LAYERS],
+    /// What each layer shows, as the list has them.
+    shown: Vec<Shown>,
     /// Their pyramids, all of one size.
     published: WeatherMaps,
 }
@@ -121,9 +129,9 @@ impl LayerMaps {
                 let make = async move { recipe.generate().unwrap_or_else(|_| WeatherMap::clear(UVec2::ONE)) };
                 entry.task = Some(AsyncComputeTaskPool::get().spawn(make));
             }
-            Source::Image { image, channels, .. } => match images.get(*image)? {
+            Source::Image { image, channels, .. } => match images.get(*image, *channels)? {
                 None => return Ok(None),
-                Some(map) => entry.map = Some(Arc::new(of_channels(map, *channels))),
+                Some(map) => entry.map = Some(Arc::new(map)),
             },
             Source::NoPath { reason } => return Err(format!("map_file: {reason}")),
         }
@@ -140,9 +148,10 @@ struct Images<'a> {
 
 impl Images<'_> {
     /// The map in an image; `None` while it loads.
-    fn get(&self, image: AssetId<Image>) -> Result<Option<WeatherMap>, String> {
+    fn get(&self, image: AssetId<Image>, channels: MapChannels) -> Result<Option<WeatherMap>, String> {
         if let Some(image) = self.loaded.get(image) {
-            return WeatherMap::from_image(image).map(Some).map_err(|error| format!("map: {error}"));
+            let map = WeatherMap::from_image_channels(image, channels);
+            return map.map(Some).map_err(|error| format!("map: {error}"));
         }
         match self.server.and_then(|server| server.get_load_state(image)) {
             Some(LoadState::Failed(error)) => Err(format!("map_file did not load: {error}")),
@@ -153,6 +162,11 @@ impl Images<'_> {
 
 /// Loads an image whose bytes are numbers, not colours.
 fn load_linear(assets: &AssetServer, path: AssetPath<'static>) -> Handle<Image> {
+    // Loaders of floats have no such setting, and it would be an error to them.
+    let floats = ["exr", "hdr"];
+    if path.path().extension().is_some_and(|end| floats.iter().any(|float| end.eq_ignore_ascii_case(float))) {
+        return assets.load(path);
+    }
     assets.load_builder().with_settings(|settings: &mut ImageLoaderSettings| settings.is_srgb = false).load(path)
 }
 
@@ -167,22 +181,6 @@ pub(crate) fn asset_path(text: &str) -> Result<AssetPath<'static>, String> {
     } else {
         Ok(path.into_owned())
     }
-}
-
-/// One channel as coverage, or the map as it is.
-fn of_channels(map: WeatherMap, channels: MapChannels) -> WeatherMap {
-    let k = match channels {
-        MapChannels::Rgb => return map,
-        MapChannels::Red => 0,
-        MapChannels::Green => 1,
-        MapChannels::Blue => 2,
-        MapChannels::Alpha => 3,
-    };
-    let mut map = map;
-    for texel in map.texels_mut() {
-        *texel = [texel[k], 255, 0, 255];
-    }
-    map
 }
 
 /// Follows the layers: makes what they ask for, forgets what nobody does.
@@ -202,44 +200,21 @@ pub(crate) fn follow_layers(
         }
     }
     let is_ahead = weather.as_ref().is_some_and(|weather| weather.layers_ahead(good.0.clock.seconds).next().is_some());
-    if good.0.layers.0.is_empty() && maps.entries.is_empty() && !is_ahead {
+    if good.0.layers.0.is_empty() && maps.entries.is_empty() && maps.shown.is_empty() && !is_ahead {
         maps.published.pending = false;
         return;
     }
     let images = Images { loaded: &images, server: assets.as_deref() };
     let in_transition = weather.as_ref().is_some_and(|weather| weather.has_moved());
-    let mut wanted = Vec::new();
+    let layers = &good.0.layers.0[..good.0.layers.0.len().min(MAX_LAYERS)];
+    let mut wanted: Vec<Source> = layers.iter().map(|layer| maps.source(layer, images.server)).collect();
+    maps.align(layers, &wanted);
     let mut pending = false;
-    let mut changed = false;
-    for (i, layer) in good.0.layers.0.iter().enumerate().take(MAX_LAYERS) {
-        let source = maps.source(layer, images.server);
+    for (i, (layer, source)) in layers.iter().zip(&wanted).enumerate() {
         // The map of one that is hidden is kept: it may be shown again.
-        if !layer.enabled {
-            wanted.push(source);
-            continue;
+        if layer.enabled {
+            pending |= maps.show(i, source, &images, in_transition);
         }
-        match maps.find(&source, &images) {
-            Ok(Some(map)) => {
-                if maps.shown[i].as_ref().is_none_or(|(now, _)| *now != source) {
-                    maps.shown[i] = Some((source.clone(), map));
-                    changed = true;
-                }
-            }
-            Ok(None) => {
-                pending = true;
-                // A layer that forms must not show with another's map and then with its own.
-                if in_transition && maps.shown[i].take_if(|(now, _)| *now != source).is_some() {
-                    changed = true;
-                }
-            }
-            Err(reason) => {
-                if !maps.told.contains(&source) {
-                    error!("clouds: layers.{i}.{reason}; the last good map stays");
-                    maps.told.push(source.clone());
-                }
-            }
-        }
-        wanted.push(source);
     }
     for layer in weather.iter().flat_map(|weather| weather.layers_ahead(good.0.clock.seconds)) {
         let source = maps.source(layer, assets.as_deref());
@@ -252,29 +227,82 @@ pub(crate) fn follow_layers(
     maps.published.pending = pending;
     maps.told.retain(|source| wanted.contains(source));
     maps.entries.retain(|entry| wanted.contains(&entry.source));
-    if changed {
-        maps.publish();
-    }
+    let reads = |source: &Source, of: AssetId<Image>| matches!(source, Source::Image { image, .. } if *image == of);
+    maps.files.retain(|(_, handle)| wanted.iter().any(|source| reads(source, handle.id())));
+    maps.publish();
 }
 
 impl LayerMaps {
+    /// Brings what is shown in line with a list that has changed: layers are known by what they ask for, or else by place
+    /// and name. One that is new shows nothing yet.
+    fn align(&mut self, layers: &[CloudLayer], sources: &[Source]) {
+        let same = |(shown, (layer, source)): (&Shown, (&CloudLayer, &Source))| {
+            shown.name == layer.name && shown.asked == *source
+        };
+        let asked = || layers.iter().zip(sources);
+        if self.shown.len() == layers.len() && self.shown.iter().zip(asked()).all(same) {
+            return;
+        }
+        let old = std::mem::take(&mut self.shown);
+        let in_place = |i: usize, name: &str| old.get(i).filter(|was| old.len() == layers.len() && was.name == name);
+        let all = asked().enumerate().map(|(i, (layer, source))| {
+            let was = old.iter().find(|was| was.asked == *source).or_else(|| in_place(i, &layer.name));
+            Shown { name: layer.name.clone(), asked: source.clone(), map: was.and_then(|was| was.map.clone()) }
+        });
+        self.shown = all.collect();
+    }
+
+    /// Shows a layer's map, or what it showed last. Returns whether the map is still to come.
+    fn show(&mut self, i: usize, source: &Source, images: &Images, in_transition: bool) -> bool {
+        let found = self.find(source, images);
+        let Some(shown) = self.shown.get_mut(i) else { return false };
+        let is_asked = |(now, _): &(Source, Arc<WeatherMap>)| now == source;
+        match found {
+            Ok(Some(map)) => {
+                if !shown.map.as_ref().is_some_and(is_asked) {
+                    shown.map = Some((source.clone(), map));
+                }
+            }
+            Ok(None) => {
+                // A layer that forms must not show with another's map and then with its own.
+                if in_transition && !shown.map.as_ref().is_some_and(is_asked) {
+                    shown.map = None;
+                }
+                return true;
+            }
+            Err(reason) => {
+                if !self.told.contains(source) {
+                    error!("clouds: layers.{i}.{reason}; the last good map stays");
+                    self.told.push(source.clone());
+                }
+            }
+        }
+        false
+    }
+
+    /// Hands on what is shown, if it is not what was.
     fn publish(&mut self) {
-        let size = self
-            .shown
-            .iter()
-            .flatten()
-            .map(|(_, map)| map.size().max_element().next_power_of_two().min(LARGEST))
-            .max()
-            .unwrap_or(1);
-        self.published.version += 1;
-        let old = std::mem::take(&mut self.published.maps);
-        for (i, shown) in self.shown.iter().enumerate() {
-            self.published.maps[i] = shown.as_ref().map(|(_, map)| {
+        let map = |i: usize| self.shown.get(i).and_then(|shown| Some(&shown.map.as_ref()?.1));
+        let is_same = |i: usize| match (map(i), &self.published.maps[i]) {
+            (Some(map), Some(published)) => Arc::ptr_eq(map, &published.map),
+            (map, published) => map.is_none() && published.is_none(),
+        };
+        if (0..MAX_LAYERS).all(is_same) {
+            return;
+        }
+        let sizes =
+            (0..MAX_LAYERS).filter_map(map).map(|map| map.size().max_element().next_power_of_two().min(LARGEST));
+        let size = sizes.max().unwrap_or(1);
+        let old = &self.published.maps;
+        let maps = std::array::from_fn(|i| {
+            map(i).map(|map| {
                 // One that has not changed is not built again.
                 let same = |p: &&Arc<WeatherPyramid>| p.size == size && Arc::ptr_eq(&p.map, map);
                 old.iter().flatten().find(same).cloned().unwrap_or_else(|| Arc::new(WeatherPyramid::new(map, size)))
-            });
-        }
+            })
+        });
+        self.published.maps = maps;
+        self.published.version += 1;
     }
 }
 
@@ -351,3 +379,7 @@ fn array(
     );
     texture.create_view(&TextureViewDescriptor { dimension: Some(dimension), ..default() })
 }
+
+#[cfg(test)]
+#[path = "weather_maps_tests.rs"]
+mod tests;

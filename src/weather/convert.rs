@@ -7,6 +7,7 @@ use bevy::{
 use thiserror::Error;
 
 use super::map::WeatherMap;
+use crate::settings::MapChannels;
 
 /// Largest side of a map, in texels.
 pub(super) const MAX_SIDE: u32 = 8192;
@@ -38,6 +39,14 @@ pub enum WeatherMapError {
         needed: usize,
         /// Bytes there.
         found: usize,
+    },
+    /// The channel that is to be coverage is not there.
+    #[error("the weather map has no {channel} channel: {reason}")]
+    MissingChannel {
+        /// `green`, `blue` or `alpha`.
+        channel: &'static str,
+        /// How that shows.
+        reason: String,
     },
     /// A number is no share: not from 0 to 1, or not a number.
     #[error("the weather map's {channel} at texel ({x}, {y}) is {value}; it must be from 0 to 1")]
@@ -173,17 +182,49 @@ impl WeatherMap {
         let picture = Picture::new(image)?;
         let mut texels = Vec::with_capacity(picture.data.len() / picture.stride());
         for (n, texel) in picture.texels().enumerate() {
-            texels.push(to_bytes(texel, n, picture.size.x)?);
+            check_shares(texel, n, picture.size.x)?;
+            texels.push(texel.map(to_byte));
         }
         if picture.channels > 2 && texels.iter().all(|[r, g, b, _]| r == g && g == b) {
             texels.iter_mut().for_each(|texel| *texel = [texel[0], 255, 0, 255]);
         }
         Ok(Self::from_texels(picture.size, texels))
     }
+
+    /// As [`from_image`](Self::from_image), with what a layer reads of it: all, or one channel as coverage, for cloud of full
+    /// height with its base at the bottom. Of the other channels nothing is asked then.
+    ///
+    /// # Errors
+    /// What is wrong with the picture, and [`WeatherMapError::MissingChannel`] where it has no such channel. An alpha that is
+    /// full everywhere counts as none: pictures without alpha are loaded so.
+    pub fn from_image_channels(image: &Image, channels: MapChannels) -> Result<Self, WeatherMapError> {
+        let (k, name) = match channels {
+            MapChannels::Rgb => return Self::from_image(image),
+            MapChannels::Red => (0, "red"),
+            MapChannels::Green => (1, "green"),
+            MapChannels::Blue => (2, "blue"),
+            MapChannels::Alpha => (3, "alpha"),
+        };
+        let missing = |reason: String| WeatherMapError::MissingChannel { channel: name, reason };
+        let picture = Picture::new(image)?;
+        if k >= picture.channels {
+            return Err(missing(format!("its format is {:?}", image.texture_descriptor.format)));
+        }
+        let mut texels = Vec::with_capacity(picture.data.len() / picture.stride());
+        for (n, texel) in picture.texels().enumerate() {
+            let chosen = [texel[k], 1.0, 0.0, 1.0];
+            check_shares(chosen, n, picture.size.x)?;
+            texels.push(chosen.map(to_byte));
+        }
+        if k == 3 && texels.iter().all(|texel| texel[0] == 255) {
+            return Err(missing("it is full everywhere, as that of pictures without one is".to_owned()));
+        }
+        Ok(Self::from_texels(picture.size, texels))
+    }
 }
 
-/// Alpha is free, so anything goes there.
-fn to_bytes(texel: [f32; 4], n: usize, width: u32) -> Result<[u8; 4], WeatherMapError> {
+/// Whether coverage, height and base are from 0 to 1. Alpha is free, so anything goes there.
+fn check_shares(texel: [f32; 4], n: usize, width: u32) -> Result<(), WeatherMapError> {
     // Half a step of a byte: what a filter or a colour space may have added.
     let slack = 0.5 / 255.0;
     for (channel, value) in ["coverage", "height", "base"].into_iter().zip(texel) {
@@ -192,5 +233,9 @@ fn to_bytes(texel: [f32; 4], n: usize, width: u32) -> Result<[u8; 4], WeatherMap
             return Err(WeatherMapError::OutOfRange { channel, x, y, value });
         }
     }
-    Ok(texel.map(|value| (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8))
+    Ok(())
+}
+
+fn to_byte(value: f32) -> u8 {
+    (value.clamp(0.0, 1.0) * 255.0 + 0.5) as u8
 }

@@ -98,6 +98,53 @@ fn a_change_by_hand_takes_over_and_a_floating_origin_does_not() {
     assert!(weather.transition_at(&preset("Cumulus"), f64::NAN, 1.0).is_err());
 }
 
+/// Frames in which the weather did something.
+#[derive(Resource, Default)]
+struct Busy(u32);
+
+#[test]
+fn a_transition_that_is_over_costs_nothing() {
+    let mut app = bare_app();
+    app.init_resource::<Busy>();
+    // Sees what the frame before did at its end.
+    app.add_systems(First, |weather: Res<CloudWeather>, mut busy: ResMut<Busy>| {
+        busy.0 += u32::from(weather.is_changed());
+    });
+    let busy = |app: &mut App, from: f64| {
+        at(app, from);
+        let before = app.world().resource::<Busy>().0;
+        (1..=20).for_each(|k| _ = at(app, from + f64::from(k)));
+        app.world().resource::<Busy>().0 - before
+    };
+    at(&mut app, 0.0);
+    to(&mut app, "Storm", 60.0);
+    at(&mut app, 0.0);
+    assert_eq!(busy(&mut app, 10.0), 20, "it stands still");
+    at(&mut app, 60.0);
+    at(&mut app, 61.0);
+    assert_eq!(busy(&mut app, 70.0), 0, "the end is written again and again");
+    let end = at(&mut app, 100.0);
+    // It goes on all the same: back in time, with a shifted origin, or to another sky.
+    let half = at(&mut app, 30.0);
+    assert_ne!(half, end);
+    assert_eq!(at(&mut app, 100.0), end);
+    at(&mut app, 101.0);
+    app.world_mut().resource_mut::<CloudModel>().world_offset = DVec3::Z;
+    let (shifted, layers, _) = at(&mut app, 102.0);
+    assert_eq!((shifted.world_offset, &layers), (DVec3::Z, &end.1));
+    assert_eq!(app.world().resource::<CloudWeather>().progress(102.0), Some(1.0));
+    at(&mut app, 103.0);
+    assert_eq!(busy(&mut app, 104.0), 0);
+    to(&mut app, "Cumulus", 60.0);
+    at(&mut app, 130.0);
+    assert_ne!(at(&mut app, 150.0).1, end.1);
+    at(&mut app, 300.0);
+    at(&mut app, 301.0);
+    app.world_mut().resource_mut::<CloudLayers>().0[0].coverage = 0.07;
+    assert_eq!(at(&mut app, 302.0).1.0[0].coverage, 0.07, "a change by hand is undone");
+    assert_eq!(app.world().resource::<CloudWeather>().progress(302.0), None);
+}
+
 fn drawn(app: &mut App, looking: Transform, window: u32) -> View {
     app.insert_resource(quality(window));
     spawn_sun(app, Vec3::new(-0.4, -1.0, -0.3));

@@ -95,8 +95,16 @@ pub fn times_logged(text: &str) -> usize {
 /// # Panics
 /// Where there is no Vulkan device: a GPU test never passes for want of a GPU. Later, on any error that the device reports.
 pub fn app_with<M>(plugins: impl Plugins<M>) -> App {
+    app_of(headless_plugins(), plugins)
+}
+
+/// As [`app_with`], with these plugins of Bevy's.
+///
+/// # Panics
+/// As [`app_with`].
+pub fn app_of<M>(bevy: PluginGroupBuilder, plugins: impl Plugins<M>) -> App {
     let mut app = App::new();
-    app.add_plugins(headless_plugins()).add_plugins(plugins);
+    app.add_plugins(bevy).add_plugins(plugins);
     app.insert_resource(RenderErrorHandler(|error, _, _| -> RenderErrorPolicy {
         panic!("the GPU reported {:?}: {}", error.ty, error.description)
     }));

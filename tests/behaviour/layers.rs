@@ -49,6 +49,18 @@ fn kinds() -> Vec<(&'static str, Vec<CloudLayer>)> {
         one("sheet", cirrus()),
         one("anvil", CloudLayer { anvil: 1.0, thickness: 9000.0, base_rise: 0.0, shape_strength: 0.2, ..cumulus() }),
         one("rain", CloudLayer { rain: 1.0, base: 1800.0, rain_depth: 1500.0, map: map(7.0), ..cumulus() }),
+        one(
+            "slant",
+            CloudLayer {
+                rain: 1.0,
+                base: 2500.0,
+                rain_depth: 2500.0,
+                rain_slant: 3.0,
+                wind_skew: -2000.0,
+                map: map(6.0),
+                ..cumulus()
+            },
+        ),
         one("more far", CloudLayer { far_coverage: 0.8, far_start: 3000.0, far_end: 30_000.0, ..cumulus() }),
         one(
             "less far",
@@ -66,7 +78,7 @@ fn kinds() -> Vec<(&'static str, Vec<CloudLayer>)> {
 }
 
 /// The model with these layers alone; waits for their maps.
-fn show(app: &mut App, layers: &[CloudLayer]) -> CloudModel {
+pub fn show(app: &mut App, layers: &[CloudLayer]) -> CloudModel {
     app.insert_resource(CloudLayers(layers.to_vec()));
     run_updates(app, 2);
     run_until(app, "the layers' maps", 600, |app| {
@@ -134,6 +146,51 @@ fn overlapping_layers_add_up() {
     }
     println!("{overlaps} points in both layers");
     assert!(overlaps > 50, "{overlaps} points are in both");
+}
+
+#[test]
+fn shafts_of_rain_slant_as_a_whole() {
+    let (slant, fall) = (1.5, 800.0);
+    let (base, radius) = (2500.0, 6.36e6_f64);
+    let layer = CloudLayer {
+        rain: 1.0,
+        base,
+        base_rise: 0.0,
+        rain_depth: 2500.0,
+        rain_slant: slant,
+        // Wide streaks, of 80 m a texel.
+        turbulence_scale: 20_000.0,
+        wind: Vec3::new(3.0, 0.0, 4.0),
+        // Another way than the shafts.
+        wind_skew: -3000.0,
+        map: map(4.0),
+        ..cumulus()
+    };
+    let mut app = model_app();
+    let model = show(&mut app, &[layer]);
+    let mut rng = StdRng::seed_from_u64(540);
+    let mut within = |end: f32| rng.random_range(-end..end);
+    let places: Vec<Vec2> = (0..4000).map(|_| Vec2::new(within(2000.0), within(2000.0))).collect();
+    let below = |metres: f32, trail: f32| -> Vec<Question> {
+        let behind = -Vec2::new(0.6, 0.8) * trail;
+        let place = |m: &Vec2| {
+            let (at, up) = ((*m + behind).as_dvec2(), radius + f64::from(base - metres));
+            DVec3::new(at.x, (up * up - at.length_squared()).sqrt() - radius, at.y).as_vec3()
+        };
+        places.iter().map(|m| at(place(m), 0.0)).collect()
+    };
+    let mut density = |metres: f32, trail: f32| -> Vec<f32> {
+        ask(&mut app, &model, &below(metres, trail)).iter().map(|answer| answer[1]).collect()
+    };
+    // Both above where shafts thin out, and a little below the base.
+    let (high, low, straight) = (density(20.0, 20.0 * slant), density(fall, fall * slant), density(fall, 20.0 * slant));
+    let off = |a: &[f32], b: &[f32]| a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, f32::max);
+    let wet = high.iter().filter(|density| **density > 0.05).count();
+    println!("{wet} in rain; along the shaft off by {}, straight down by {}", off(&high, &low), off(&high, &straight));
+    assert!(wet > 300, "{wet} places in rain");
+    // The planet's curve moves places by up to half a metre over the fall, in streaks that change by 0.03 a metre at most.
+    assert!(off(&high, &low) < 0.02, "the shaft is another {fall} m down: {}", off(&high, &low));
+    assert!(off(&high, &straight) > 0.3, "shafts hang straight down");
 }
 
 /// Points within the layers, near enough that single clouds are told apart.

@@ -65,6 +65,29 @@ fn a_model_that_does_not_compile_leaves_the_last_good_one() {
 }
 
 #[test]
+fn the_built_in_model_is_back_when_the_resource_is_removed() {
+    let mut app = slab_app(1500.0, 2500.0, 0.0006);
+    app.world_mut().remove_resource::<ModelShader>();
+    app.insert_resource(CloudModel { coverage: 0.7, ..default() });
+    let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()));
+    let view = spawn_linear(&mut app, UVec2::new(12, 8), up);
+    let picture = |app: &mut App| {
+        settle(app);
+        until_drawn(app);
+        settle(app);
+        linear_pixels(app, &view)
+    };
+    // Removed before it was ever seen.
+    let built_in = picture(&mut app);
+    app.insert_resource(slab(1500.0, 2500.0, 0.0006));
+    assert!(picture(&mut app) != built_in, "the model is not replaced");
+    app.world_mut().remove_resource::<ModelShader>();
+    assert!(picture(&mut app) == built_in, "the built-in model is not back");
+    app.insert_resource(slab(1500.0, 2500.0, 0.003));
+    assert!(picture(&mut app) != built_in, "the model is not replaced again");
+}
+
+#[test]
 fn the_examples_rings_keep_a_models_promises() {
     let mut app = model_app();
     app.insert_resource(ModelShader(include_str!("../../examples/custom_model/rings.wesl").to_owned()));

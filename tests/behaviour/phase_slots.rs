@@ -75,6 +75,24 @@ fn the_march_mixes_phase_functions_by_share() {
     assert_eq!(times_logged("phases[1].g = 1.5 is outside its range"), 1);
 }
 
+#[test]
+fn a_fourth_phase_function_of_layers_is_told_with_its_layer() {
+    let mut app = crate::view::clouds_app();
+    let layer = |k: u8| CloudLayer {
+        name: format!("slot {k}"),
+        own_phase: true,
+        phase: of(PhaseFunction::HenyeyGreenstein, 0.1 * f32::from(k)),
+        ..default()
+    };
+    let says = "layers.4.phase (\"slot 4\") takes the light's phase function";
+    app.insert_resource(CloudLayers(vec![layer(1), layer(2), layer(1), layer(3)]));
+    run_updates(&mut app, 2);
+    assert_eq!(times_logged(says), 0);
+    app.insert_resource(CloudLayers([1, 2, 1, 3, 4].map(layer).to_vec()));
+    run_updates(&mut app, 4);
+    assert_eq!(times_logged(says), 1);
+}
+
 /// The chain of narrow events between the sun and a broad one is drawn before it is known where they are: as much light
 /// must arrive whatever the shares there.
 #[test]

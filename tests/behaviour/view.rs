@@ -21,7 +21,8 @@ use bevy::{
 use bevy_cumulus::prelude::*;
 
 use crate::gpu::{
-    app_with, assert_shaders_compile, pipelines_are_there, read_mapped, run_until, run_updates, webgpu_limits,
+    app_of, app_with, assert_shaders_compile, headless_plugins, pipelines_are_there, read_mapped, run_until,
+    run_updates, webgpu_limits,
 };
 
 /// What is behind the clouds.
@@ -54,7 +55,16 @@ pub fn clouds_app() -> App {
 
 /// [`clouds_app`] with these plugins, of which [`CloudsPlugin`] must be one.
 pub fn clouds_app_with<M>(plugins: impl Plugins<M>) -> App {
-    let mut app = app_with(plugins);
+    small_clouds(app_with(plugins))
+}
+
+/// [`clouds_app`] with this folder for its assets.
+pub fn clouds_app_in(folder: &std::path::Path) -> App {
+    let assets = AssetPlugin { file_path: folder.to_string_lossy().into_owned(), ..default() };
+    small_clouds(app_of(headless_plugins().set(assets), CloudsPlugin))
+}
+
+fn small_clouds(mut app: App) -> App {
     let unsupported = app.world().resource::<CloudStatus>().unsupported().map(str::to_owned);
     assert_eq!(unsupported, None, "clouds cannot be drawn on this device");
     app.insert_resource(CloudTextures { volume_size: 32, map_size: 64, ..default() })

@@ -1,6 +1,6 @@
 //! Weather maps: made, converted, edited; and skies from reports and soundings.
 
-mod convert;
+pub mod convert;
 mod edits;
 mod maps;
 #[cfg(feature = "metar")]

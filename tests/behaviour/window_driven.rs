@@ -84,6 +84,19 @@ fn keys_change_the_sky() {
     screen.wait_for("P to bring another preset", |now| now.differs(&before, SKY) > 8.0);
 }
 
+#[test]
+fn p_goes_on_through_skies_that_differ_in_layers_alone() {
+    if in_the_other_run() {
+        return;
+    }
+    let (mut screen, _) = fly(&["--preset", "Cumulus", "--set", "clock.speed=0"]);
+    for _ in 0..2 {
+        let before = screen.picture();
+        screen.act(&["key", "p"]);
+        screen.wait_for("P to bring another sky", |now| now.differs(&before, SKY) > 8.0);
+    }
+}
+
 /// Waits until this part stays as it is: an animation has ended. For longer than a slow frame takes.
 fn still(screen: &mut Screen, part: Part) {
     let (mut last, mut times) = (screen.picture(), 0);

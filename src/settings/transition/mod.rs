@@ -64,6 +64,9 @@ pub struct CloudWeather {
     /// Whether this frame shows another sky than the last, by a transition.
     #[reflect(ignore)]
     moved: bool,
+    /// Whether what was written last is the last transition's end: from there on nothing changes.
+    #[reflect(ignore)]
+    ended: bool,
 }
 
 #[derive(Clone, Debug)]
@@ -118,6 +121,12 @@ impl CloudWeather {
     /// How much of the transition that is shown at cloud time `seconds` is over, 0 to 1; `None` where there is none.
     pub fn progress(&self, seconds: f64) -> Option<f64> {
         self.leg(seconds).map(|leg| leg.span.progress(seconds))
+    }
+
+    /// Whether nothing is left to do at cloud time `t` unless somebody changes the sky: its end has been written already.
+    fn rests(&self, t: f64) -> bool {
+        let over = |leg: &Leg| leg.span.progress(t) >= 1.0;
+        self.asked.is_empty() && self.ended && !self.moved && self.legs.last().is_some_and(over)
     }
 
     /// The latest that has begun, or the first.
@@ -193,6 +202,10 @@ pub(super) fn change_weather(
     if clock.validate().is_err() {
         return;
     }
+    let touched = model.is_changed() || layers.is_changed() || lighting.is_changed();
+    if !touched && weather.rests(clock.seconds) {
+        return;
+    }
     let weather = &mut *weather;
     if !weather.written.as_ref().is_some_and(|sky| sky.is(&model, &layers, &lighting)) {
         // Somebody else has taken over.
@@ -207,6 +220,7 @@ pub(super) fn change_weather(
         }
         weather.take_in(&shown, clock.seconds);
     }
+    weather.ended = weather.legs.last().is_some_and(|leg| leg.span.progress(clock.seconds) >= 1.0);
     let Some(leg) = weather.leg(clock.seconds) else { return };
     let mut sky = leg.at(clock.seconds);
     sky.model.world_offset = model.world_offset;

@@ -120,7 +120,8 @@ impl Leg {
     }
 
     fn moved_layer(&self, a: &CloudLayer, b: &CloudLayer, u: f64, t: f64) -> CloudLayer {
-        let mut now = a.clone();
+        // Both read one map. Of an image's recipe only what is equal counts; a size half way would be none.
+        let mut now = CloudLayer { map: b.map.clone(), ..a.clone() };
         mix(&mut now, b, ease(u));
         let speeds = [a, b, &now].map(|l| speed(l.wind, l.evolution));
         now.drift = self.span.drift3(a.drift, speeds, t);
@@ -154,13 +155,7 @@ fn speed(wind: Vec3, evolution: f32) -> DVec3 {
 /// Whether so many layers, with as many phase functions, can be shown at once.
 fn fit_together<'a>(layers: impl Iterator<Item = &'a CloudLayer>) -> bool {
     let all = CloudLayers(layers.cloned().collect());
-    let mut phases = Vec::new();
-    for layer in all.0.iter().filter(|layer| layer.own_phase && layer.enabled) {
-        if !phases.contains(&layer.phase) {
-            phases.push(layer.phase);
-        }
-    }
-    all.0.len() <= MAX_LAYERS && phases.len() <= 3
+    all.0.len() <= MAX_LAYERS && all.without_slot().is_none()
 }
 
 /// Direction of the wind over the map; none where it is calm.
@@ -196,13 +191,12 @@ fn matches_layer(a: &CloudLayer, b: &CloudLayer) -> bool {
         DVec2::from_angle(f64::from(l.stretch_angle).to_radians()).rotate(downwind(l.wind).unwrap_or(DVec2::X))
     };
     let same_along = a.stretch == 1.0 || along(a).distance(along(b)) < 1e-6;
-    let same_phase = a.own_phase == b.own_phase && (!a.own_phase || a.phase == b.phase);
     a.name == b.name
         && a.kind == b.kind
         && same_map
         && noise(a) == noise(b)
         && same_along
-        && same_phase
+        && a.its_phase() == b.its_phase()
         && winds_match(a.wind, b.wind)
 }
 

@@ -140,3 +140,24 @@ fn too_many_layers_take_turns() {
         |u: f64| leg.at(BEGIN + u * SECONDS).layers.0.iter().map(|l| l.name[..1].to_owned()).collect::<String>();
     assert_eq!([0.0, 0.3, 0.7, 1.0].map(names), ["aaaaaa", "aaaaaa", "bbbbbb", "bbbbbb"]);
 }
+
+#[test]
+fn layers_of_one_image_change_in_place_whatever_their_recipes() {
+    use crate::weather::WeatherRecipe;
+    let layer = |size: u32, coverage: f32| CloudLayer {
+        map_file: "maps/painted.png".to_owned(),
+        map: WeatherRecipe { size, cover: size as f32 / 256.0, ..WeatherRecipe::default() },
+        coverage,
+        ..CloudLayer::default()
+    };
+    let of = |layer| Sky { layers: CloudLayers(vec![layer]), ..Sky::default() };
+    let span = Span { begin: BEGIN, seconds: SECONDS };
+    let leg = Leg { start: of(layer(512, -0.1)), target: of(layer(1024, 0.2)), span };
+    for k in 0..=100 {
+        let sky = leg.at(BEGIN + SECONDS * f64::from(k) / 100.0);
+        sky.layers.validate().unwrap_or_else(|error| panic!("at {k} %: {error}"));
+        assert_eq!(sky.layers.0.len(), 1, "at {k} %: one does not become the other");
+    }
+    let half = &leg.at(BEGIN + 0.5 * SECONDS).layers.0[0];
+    assert!((half.coverage - 0.05).abs() < 1e-6, "{}", half.coverage);
+}

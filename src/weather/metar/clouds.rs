@@ -26,7 +26,7 @@ const USUAL_FOG: f32 = 500.0;
 impl MetarSky {
     /// The reported sky as layers, from low to high: each group with its cover and base, the genus that is most likely at its
     /// height (as [`genus`](Self::genus) says) and its look from that genus's preset, wind by [`WindProfile`], and rain where
-    /// it rains. Fog lies on the ground. `latitude` in degrees north; another `seed` gives other clouds of the same report.
+    /// the report says that it rains. Fog lies on the ground. `latitude` in degrees north; another `seed` gives other clouds of the same report.
     pub fn layers(&self, latitude: f32, seed: u32) -> CloudLayers {
         let mut layers: Vec<CloudLayer> = Vec::new();
         if self.fog || self.groups.iter().any(|group| group.is_obscured) {
@@ -40,7 +40,7 @@ impl MetarSky {
                 && which == i
             {
                 self.let_rain(&mut layer, falls);
-            } else if group.kind != Some(CloudKind::Cumulonimbus) {
+            } else {
                 layer.rain = 0.0;
             }
             layer.rain_depth = (layer.base - self.elevation).clamp(0.0, 20_000.0);

@@ -238,10 +238,14 @@ fn what_cannot_be_told_is_said() {
     app.insert_resource(crate::stage::slab(1000.0, 2000.0, 0.01));
     run_updates(&mut app, 1);
     assert_eq!(error(&app), Some(CloudFieldError::CustomModel));
-    // Taking the resource away does not bring the built-in model back.
+    // Taking the resource away brings the built-in model back.
     app.world_mut().remove_resource::<ModelShader>();
-    run_updates(&mut app, 2);
-    assert_eq!(error(&app), Some(CloudFieldError::CustomModel));
+    run_updates(&mut app, 1);
+    assert_eq!(error(&app), None);
+    // One that does not compile does not take its place.
+    app.insert_resource(ModelShader("fn nothing() {}".to_owned()));
+    run_updates(&mut app, 1);
+    assert_eq!(error(&app), None);
 }
 
 #[test]

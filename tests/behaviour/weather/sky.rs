@@ -48,6 +48,19 @@ fn it_rains_from_the_cloud_that_rain_falls_from() {
 }
 
 #[test]
+fn it_does_not_rain_where_the_report_has_no_precipitation() {
+    for line in [
+        "MDSD 192000Z 08008KT 9999 FEW020CB SCT022 BKN300 32/25 Q1012",
+        "UUDD 291130Z 22005MPS 8000 TS SCT033CB 13/10 Q1003",
+        "EDDF 041120Z 27012KT 9999 VCSH BKN012CB 21/17 Q1016",
+    ] {
+        let all = layers(line, 0.0);
+        assert!(all.iter().any(|layer| layer.name.starts_with("cumulonimbus")), "{line}");
+        assert!(all.iter().all(|layer| layer.rain == 0.0), "{line}: {all:?}");
+    }
+}
+
+#[test]
 fn fog_lies_on_the_ground() {
     let all = layers("EHAM 050625Z VRB02KT 0200 FG VV001 03/03 Q1030", -3.0);
     assert_eq!(all.len(), 1);
