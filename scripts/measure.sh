@@ -4,9 +4,9 @@
 
 measure_options="  --no-install     install nothing; where something is missing, name it and exit with status 3
   --full           1920x1080 and more samples: for a GPU
-  --size WxH       size of the pictures (128x72)
+  --size WxH       size of the pictures (128x72; fidelity 96x54)
   --zoom Z         show the middle of each view Z times larger, so that small pictures have fine pixels (3; with --full 1)
-  --spp N          samples a pixel of each reference picture (128; with --full 4096)
+  --spp N          samples a pixel of each reference picture (128; fidelity 64; with --full 4096)
   --only A,B       only these parts; the report then goes to the output folder
   --out DIR        where results go
   --report FILE    the report, if not in its usual place

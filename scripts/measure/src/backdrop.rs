@@ -13,7 +13,7 @@ use crate::{
     progress::Progress,
 };
 
-/// No cloud anywhere, and textures that are soon baked.
+/// No cloud of the model anywhere, and textures that are soon baked. Layers are turned off one by one.
 const CLEAR: &str = "--quality low --set model.coverage=-1 --set textures.volume_size=32 --set textures.map_size=64";
 /// Stops by which the sky is shown darker each time. A pixel is read where it is not yet overexposed.
 const BRACKETS: [f32; 3] = [0.0, 4.0, 8.0];
@@ -34,14 +34,15 @@ impl Backdrop {
 
     /// Renders the sky of a scene at some exposures, and reads its light back from what was shown.
     pub fn of(engine: &Engine, scene: &str, size: &str, progress: &Progress) -> Result<Self> {
-        let ev = engine.effective(&format!("--scene {scene}"))?["ev100"]
-            .as_f64()
-            .context("headless --effective: no ev100")?;
+        let settings = engine.effective(&format!("--scene {scene}"))?;
+        let ev = settings["ev100"].as_f64().context("headless --effective: no ev100")?;
+        let layers = settings["layers"].as_array().context("headless --effective: no layers")?.len();
+        let clear = (0..layers).fold(CLEAR.to_owned(), |all, i| format!("{all} --set layers.{i}.enabled=false"));
         let mut found: Option<Self> = None;
         for (i, stops) in BRACKETS.into_iter().enumerate() {
             let exposed = ev + f64::from(stops);
             let name = format!("clear_{i}");
-            let job = Job { name: name.clone(), options: CLEAR.into(), frames: 2, picture: true };
+            let job = Job { name: name.clone(), options: clear.clone(), frames: 2, picture: true };
             // One exposure to a run.
             engine.render_sharing(&format!("--ev {exposed}"), scene, size, &[job], progress)?;
             let seen = Self::read(&engine.picture(scene, &name)?.shown, exposed);

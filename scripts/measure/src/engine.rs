@@ -91,10 +91,7 @@ impl Engine {
 
     /// Frames after which a picture with these options is finished: its window is full.
     pub fn frames(&self, options: &str) -> Result<u32> {
-        let quality = &self.effective(options)?["quality"];
-        let window = quality["window"].as_u64().unwrap_or(8) as u32;
-        // A few at least, for the median of their times.
-        Ok(if quality["temporal"] == "Off" { 4 } else { window.max(4) })
+        Ok(finished_after(&self.effective(options)?["quality"]))
     }
 
     /// The folder of a scene's files.
@@ -200,6 +197,21 @@ impl Engine {
     }
 }
 
+/// Frames after which a picture of this quality no longer changes but for noise; four at least, for the median of their
+/// times.
+fn finished_after(quality: &Value) -> u32 {
+    let window = quality["window"].as_u64().unwrap_or(8) as u32;
+    let frames = match quality["temporal"].as_str() {
+        Some("Off") => 1,
+        // Each texel is marched in one frame of a block.
+        Some("Upscale") => window * if quality["block"] == "Four" { 16 } else { 4 },
+        // What the first frame leaves of itself then is e⁻³.
+        Some("Exponential") => (3.0 / quality["alpha"].as_f64().unwrap_or(0.05)).ceil() as u32,
+        _ => window,
+    };
+    frames.max(4)
+}
+
 /// Says that a job's other files are whole.
 fn done_path(folder: &Path, job: &Job) -> PathBuf {
     folder.join(&job.name).with_extension("done")
@@ -242,6 +254,18 @@ mod tests {
     fn software_drivers_are_known() {
         assert!(is_software("llvmpipe (LLVM 15.0.6, 256 bits) (Vulkan)"));
         assert!(!is_software("NVIDIA H100 (Vulkan)"));
+    }
+
+    #[test]
+    fn a_picture_is_finished_when_all_its_samples_are_there() {
+        let of = |temporal: &str, block: &str| {
+            finished_after(
+                &serde_json::json!({ "window": 8, "alpha": 0.05, "temporal": temporal, "block": block }),
+            )
+        };
+        let found = [("Off", "Two"), ("SlidingWindow", "Two"), ("Upscale", "Two"), ("Upscale", "Four")];
+        assert_eq!(found.map(|(temporal, block)| of(temporal, block)), [4, 8, 32, 128]);
+        assert_eq!(of("Exponential", "Two"), 60);
     }
 
     #[test]

@@ -21,18 +21,28 @@ use crate::{
 
 /// Sources that the path-traced picture follows from. What only the march reads is left out, so that tuning it keeps
 /// the references.
-const SOURCES: [&str; 8] = [
+const SOURCES: [&str; 16] = [
     "src/model",
     "src/textures",
+    "src/weather",
     "src/render/sky",
+    "src/render/frame.rs",
+    "src/render/frame.wesl",
+    "src/render/phase_slots.rs",
     "src/phases",
     "src/reference/path_tracer",
+    "src/reference/phase.rs",
+    "src/reference/phase_table.rs",
+    "src/reference/mie.rs",
+    "src/reference/ice.rs",
     "src/render/march/phase.wesl",
+    "src/render/march/table.wesl",
     "src/render/march/aerial.wesl",
-    "examples/common",
 ];
 /// What a stand-in follows from.
-const ALL_SOURCES: [&str; 2] = ["src", "examples/common"];
+const ALL_SOURCES: [&str; 1] = ["src"];
+/// Where the scenes are.
+const SCENES: &str = "examples/common";
 
 /// Settings of the lighting that only the march has.
 const MARCH_ONLY: [&str; 10] = [
@@ -135,7 +145,7 @@ impl Recipe {
         let mut hasher = DefaultHasher::new();
         (settings.to_string(), &self.quality, self.samples, &self.halves).hash(&mut hasher);
         let sources: &[&str] = if self.is_stand_in() { &ALL_SOURCES } else { &SOURCES };
-        for source in sources {
+        for source in sources.iter().chain([&SCENES]) {
             hash_files(&self.repository.join(source), &mut hasher)?;
         }
         Ok(hasher.finish())
@@ -175,6 +185,15 @@ fn hash_files(path: &Path, hasher: &mut DefaultHasher) -> Result<()> {
 mod tests {
     use super::*;
     use serde_json::json;
+
+    /// A file that is moved would no longer be hashed, and an old picture taken for the truth.
+    #[test]
+    fn every_source_is_there() {
+        let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+        for source in SOURCES.iter().chain(&ALL_SOURCES).chain([&SCENES]) {
+            assert!(root.join(source).exists(), "{source}");
+        }
+    }
 
     #[test]
     fn tuning_the_march_keeps_the_key_and_the_sky_does_not() {

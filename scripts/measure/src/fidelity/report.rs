@@ -67,6 +67,7 @@ pub fn write(results: &Results) -> String {
         .replace("RADIUS", &RADIUS.to_string());
     text += &noise(results);
     text += &presets(results);
+    text += &front(results);
     text += &passes(results);
     text += &alone(results);
     for scene in 0..results.scenes.len() {
@@ -141,6 +142,64 @@ fn presets(results: &Results) -> String {
         .collect();
     let head = ["mean of the scenes", "FLIP", "FLIP, all", "relMSE", "luminance", "T error", "cost"];
     format!("\n## Presets against the reference\n\n{}", table(&head, &rows))
+}
+
+/// Costs that differ by less are taken as equal: they are not measured more closely than that.
+const SAME_COST: f64 = 0.03;
+
+/// What a row costs and how wrong it is; less is better in each.
+#[derive(Clone, Copy, PartialEq, Debug)]
+struct Place {
+    cost: f64,
+    flip: f64,
+    rel_mse: f64,
+}
+
+impl Place {
+    /// Whether nothing speaks for the other one.
+    fn dominates(&self, other: &Self) -> bool {
+        self.cost <= other.cost * (1.0 + SAME_COST)
+            && self.flip <= other.flip
+            && self.rel_mse <= other.rel_mse
+            && (self.cost < other.cost * (1.0 - SAME_COST) || self.flip < other.flip || self.rel_mse < other.rel_mse)
+    }
+}
+
+/// Which presets, and changes of High, are worth what they cost.
+fn front(results: &Results) -> String {
+    let all: Vec<(usize, Place)> = of_group(results, &[Group::Preset, Group::FromHigh])
+        .into_iter()
+        .filter_map(|i| {
+            let errors = mean(results, i, |f| f.to_truth)?;
+            Some((i, Place { cost: results.ratio(i)?, flip: errors.flip, rel_mse: errors.rel_mse }))
+        })
+        .collect();
+    let mut sorted = all.clone();
+    sorted.sort_by(|a, b| a.1.cost.total_cmp(&b.1.cost));
+    let rows: Vec<_> = sorted
+        .into_iter()
+        .map(|(i, place)| {
+            let better: Vec<&str> = all
+                .iter()
+                .filter(|(other, at)| *other != i && at.dominates(&place))
+                .map(|(other, _)| results.rows[*other].label)
+                .collect();
+            let verdict = if better.is_empty() { "on the front".to_owned() } else { better.join("; ") };
+            vec![
+                results.rows[i].label.to_owned(),
+                number(place.cost),
+                number(place.flip),
+                number(place.rel_mse),
+                verdict,
+            ]
+        })
+        .collect();
+    format!(
+        "\n### What is worth its cost\n\nBy cost. A row is dominated where another one costs no more (within {} %) and is worse \
+         in neither error.\n\n{}",
+        SAME_COST * 100.0,
+        table(&["mean of the scenes", "cost", "FLIP", "relMSE", "dominated by"], &rows),
+    )
 }
 
 /// Time of each pass of each preset.
@@ -233,4 +292,20 @@ fn settings(results: &Results) -> String {
         let _ = writeln!(text, "- {}: `{}`", row.label, row.options);
     }
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_row_is_dominated_where_nothing_speaks_for_it() {
+        let at = |cost: f64, flip: f64, rel_mse: f64| Place { cost, flip, rel_mse };
+        let own = at(1.0, 0.1, 0.2);
+        assert!(at(0.9, 0.1, 0.2).dominates(&own), "cheaper");
+        assert!(at(1.02, 0.09, 0.2).dominates(&own), "as cheap, and better");
+        assert!(!at(1.1, 0.05, 0.1).dominates(&own), "better, but dearer");
+        assert!(!at(0.5, 0.05, 0.3).dominates(&own), "worse in one error");
+        assert!(!own.dominates(&own), "itself");
+    }
 }
