@@ -18,7 +18,7 @@ use bevy::{
     pbr::AtmosphereSettings,
     prelude::*,
 };
-use bevy_cumulus::prelude::*;
+use bevy_cumulus::{prelude::*, reference::planet::PLANET_RADIUS};
 use serde::Serialize;
 
 /// Defaults for a picture: what is in it, and from where it is seen.
@@ -314,9 +314,15 @@ pub fn camera(ev100: f32) -> impl Bundle {
     (Camera3d::default(), Hdr, Exposure { ev100 }, Tonemapping::AcesFitted)
 }
 
-/// The parts of a camera that need Bevy's atmosphere.
-pub fn sky_camera() -> impl Bundle {
-    // Aerial perspective as far as clouds are seen, not only to Bevy's 32 km.
-    let settings = AtmosphereSettings { aerial_view_lut_max_distance: 100_000.0, ..default() };
+/// How far Bevy's table of the air before things has to reach (m) at this altitude (m): to the horizon, beyond which the
+/// ground would show too dark, or where that is near as far as clouds are seen.
+pub fn air_reach(altitude: f32) -> f32 {
+    let horizon = (2.0 * PLANET_RADIUS as f32 * altitude.max(0.0)).sqrt();
+    (1.1 * horizon).clamp(100_000.0, 400_000.0)
+}
+
+/// The parts of a camera that need Bevy's atmosphere, at this altitude (m).
+pub fn sky_camera(altitude: f32) -> impl Bundle {
+    let settings = AtmosphereSettings { aerial_view_lut_max_distance: air_reach(altitude), ..default() };
     (settings, AtmosphereEnvironmentMapLight::default())
 }

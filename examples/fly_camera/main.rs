@@ -132,7 +132,7 @@ fn setup(world: &mut World) {
     let view = CloudView { debug: start.scene.debug, ..default() };
     let camera = world.spawn((common::camera(ev100), view, Msaa::Off, flying, pose)).id();
     if start.sky {
-        world.entity_mut(camera).insert(common::sky_camera());
+        world.entity_mut(camera).insert(common::sky_camera(start.camera.position.y));
     }
 }
 

@@ -7,6 +7,7 @@ use bevy::{
     camera::{RenderTarget, Viewport},
     diagnostic::DiagnosticsStore,
     log::{Level, LogPlugin},
+    pbr::AtmosphereSettings,
     prelude::*,
     render::{
         RenderApp, RenderPlugin,
@@ -156,7 +157,7 @@ impl Studio {
             .insert(if plan.msaa == 4 { Msaa::Sample4 } else { Msaa::Off })
             .id();
         if plan.sky {
-            world.entity_mut(camera).insert(common::sky_camera());
+            world.entity_mut(camera).insert(common::sky_camera(plan.camera(0).position.y));
         }
         if let Some(buffer) = &buffer {
             world.entity_mut(camera).insert(CloudBuffer(buffer.clone()));
@@ -318,6 +319,9 @@ impl Studio {
         for camera in self.cameras() {
             if let Some(mut exposure) = self.app.world_mut().get_mut::<bevy::camera::Exposure>(camera) {
                 exposure.ev100 = plan.ev100;
+            }
+            if let Some(mut air) = self.app.world_mut().get_mut::<AtmosphereSettings>(camera) {
+                air.aerial_view_lut_max_distance = common::air_reach(plan.camera(0).position.y);
             }
         }
     }
