@@ -8,7 +8,7 @@ use crate::{settings::CloudLayers, textures::weather_maps::asset_path};
 /// Files of tables in use.
 #[derive(Resource, Default)]
 pub(super) struct TableFiles {
-    loaded: Vec<(String, Handle<CloudPhaseTable>)>,
+    pub(super) loaded: Vec<(String, Handle<CloudPhaseTable>)>,
     /// Slots 1 to 3: the place of the slot's file among the loaded.
     slots: Vec<Option<usize>>,
     /// Files that something is wrong with, told once.
