@@ -127,6 +127,39 @@ fn transmittance_and_single_scattering_are_the_closed_forms() {
 }
 
 #[test]
+fn clouds_merge_with_the_background_as_in_the_march() {
+    let (depth, end, start) = (6.0, 700.0, 0.2);
+    let mut app = traced_app(Some(slab(depth, [0.9; 3])), sun_light(PhaseFunction::Isotropic));
+    app.world_mut().resource_mut::<CloudLighting>().fade_start = start as f32;
+    app.world_mut().resource_mut::<CloudQuality>().max_distance = end as f32;
+    spawn_sun(&mut app, Vec3::NEG_Y);
+    let view = spawn_pinhole(&mut app, UVec2::new(96, 64), 1.0);
+    // From 20 m on; what is lost of the light behind, by how much of it is shown.
+    let (steps, extinction) = (20_000, depth / THICKNESS);
+    let dt = (end - 20.0) / f64::from(steps);
+    let opacity: f64 = (0..steps)
+        .map(|k| {
+            let t = (f64::from(k) + 0.5) * dt;
+            let u = ((t + 20.0 - start * end) / (end - start * end)).clamp(0.0, 1.0);
+            extinction * dt * (-extinction * t).exp() * (1.0 - u * u * (3.0 - 2.0 * u))
+        })
+        .sum();
+    let [.., traced] = mean(&mut app, &view, 40);
+    assert_near(1.0 - traced, opacity, 0.01, "path-traced opacity");
+    let fine = CloudQuality {
+        step: 4.0,
+        step_growth: 0.0,
+        max_steps: 1000,
+        transmittance_stop: 0.0,
+        offsets: false,
+        ..default()
+    };
+    app.insert_resource(CloudQuality { temporal: TemporalMode::Off, max_distance: end as f32, ..fine });
+    let [.., marched] = mean(&mut app, &view, 2);
+    assert_near(1.0 - marched, opacity, 0.01, "marched opacity");
+}
+
+#[test]
 fn in_a_white_furnace_clouds_vanish() {
     let lighting = CloudLighting { ground_albedo: Vec3::ONE, ..sky_light(PhaseFunction::HgDraine) };
     let mut app = traced_app(None, lighting);
