@@ -150,10 +150,7 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         let mut sum = Medium::EMPTY;
         let own = [self.model.bottom, self.model.top].map(f64::from);
         if self.has_profile() && h > own[0] && h < own[1] {
-            let one = self.sample_profile(p, h, lod);
-            if one.extinction > 0.0 {
-                sum = Medium { span: DVec2::new(h - own[0], own[1] - h), ..one };
-            }
+            sum = Medium { span: DVec2::new(h - own[0], own[1] - h), ..self.sample_profile(p, h, lod) };
         }
         for layer in self.layers() {
             let [bottom, top] = [layer.layer.bottom, layer.layer.top].map(f64::from);

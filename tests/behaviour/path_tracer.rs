@@ -40,7 +40,7 @@ pub fn mixed_slab(depth: f64, [r, g, b]: [f64; 3], [p, q, s, t]: [f64; 4]) -> Mo
         fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
             let h = altitude(p, {PLANET_RADIUS:?});
             if h < {BOTTOM:?} || h > {top:?} {{ return empty_medium(); }}
-            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, vec2(500.0),
+            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, vec2(h - {BOTTOM:?}, {top:?} - h),
                 vec4({p:?}, {q:?}, {s:?}, {t:?}));
         }}"
     ))
