@@ -221,7 +221,7 @@ fn a_transition_keeps_the_history_and_no_frame_jumps() {
     println!("{means:.3?}");
     assert!(most - least > 0.3, "nothing changes");
     assert_eq!(anew, 0, "frames held were dropped");
-    assert!(greatest_step(&pictures) < 0.04 * (most - least), "a frame jumps by {}", greatest_step(&pictures));
+    assert!(greatest_step(&pictures) < 0.05 * (most - least), "a frame jumps by {}", greatest_step(&pictures));
     assert!(ratio < NO_JUMP, "frame {worst} jumps by {ratio} medians");
     // A change by hand does begin anew.
     app.world_mut().resource_mut::<CloudModel>().density = 0.7;

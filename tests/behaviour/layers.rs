@@ -244,7 +244,7 @@ fn steps(app: &mut App, view: &View) -> Vec<f32> {
 
 #[test]
 fn an_empty_gap_between_decks_costs_next_to_nothing() {
-    let low = CloudLayer { map: map(6.0), extinction: 0.002, base_rise: 0.0, ..cumulus() };
+    let low = CloudLayer { map: map(7.0), coverage: 0.3, extinction: 0.002, base_rise: 0.0, ..cumulus() };
     let high = CloudLayer { base: 11_000.0, base_rise: 0.0, thickness: 1500.0, ..low.clone() };
     let (mut app, view) = above_us(&[low.clone(), high.clone()]);
     let of = |app: &mut App| (steps(app, &view), cloud_pixels(app, &view));
