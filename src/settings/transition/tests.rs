@@ -187,8 +187,7 @@ fn a_restart_midway_does_not_jump_and_holds_eight_layers() {
 fn phase_functions_and_octaves_change_by_degrees() {
     let light = |phase: PhaseFunction, octaves: u32, g: f32, halo: f32| {
         let lighting = CloudLighting { phase, octaves, g, halo, ..CloudLighting::default() };
-        let preset = CloudPreset { lighting, ..all()[0].1.clone() };
-        preset
+        CloudPreset { lighting, ..all()[0].1.clone() }
     };
     let presets = [
         light(PhaseFunction::HgDraine, 3, 0.8, 0.0),
