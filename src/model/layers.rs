@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use bevy::{prelude::*, render::render_resource::ShaderType};
 use glam::DVec2;
 
-use super::{TangentFrame, uniform::wrapped};
+use super::{TangentFrame, places::WAVES, uniform::wrapped};
 use crate::{
     settings::{CloudLayer, CloudModel, LayerKind, MAX_LAYERS, OwnPhase},
     weather::SWIRL_SIZE,
@@ -13,10 +13,6 @@ use crate::{
 
 /// Most places of [`CloudZone`](crate::CloudZone) that are followed.
 pub(crate) const MAX_ZONES: usize = 8;
-
-/// Wave vectors of the choice between two places of the map: those of `layer.wesl`, per repeat.
-pub(crate) const WAVES: [DVec2; 3] =
-    [DVec2::new(2.4049, 0.8341), DVec2::new(-1.1823, 1.7329), DVec2::new(0.3719, -2.1317)];
 
 /// Direction in which clouds are renewed: along none of the waves, nor across.
 const RENEWS: DVec2 = DVec2::new(0.8, 0.6);

@@ -7,6 +7,7 @@ mod bindings;
 mod check;
 mod layers;
 mod lines;
+mod places;
 mod probe;
 mod space;
 mod uniform;
@@ -15,7 +16,8 @@ mod zone_at;
 use bevy::{prelude::*, shader::load_shader_library};
 
 pub(crate) use bindings::ModelBindings;
-pub(crate) use layers::{FINER, LayerSizes, LayerUniform, MAX_ZONES, WAVES, ZoneUniform, decks};
+pub(crate) use layers::{FINER, LayerSizes, LayerUniform, MAX_ZONES, ZoneUniform, decks};
+pub(crate) use places::{NEXT, WAVES};
 pub(crate) use space::TangentFrame;
 pub(crate) use uniform::{ModelSettings, ModelUniform, TexelSizes};
 pub(crate) use zone_at::ZoneAt;
@@ -63,6 +65,7 @@ impl Plugin for CloudModelPlugin {
         load_shader_library!(app, "planet.wesl");
         load_shader_library!(app, "data.wesl");
         load_shader_library!(app, "zones.wesl");
+        load_shader_library!(app, "places.wesl");
         load_shader_library!(app, "profile.wesl");
         load_shader_library!(app, "layer.wesl");
         // Not loaded as an embedded asset: that would come later, and could take the place of a user's module.
@@ -85,10 +88,7 @@ fn model_deck(i: u32) -> vec2<f32> {
 ",
     ),
     ("model_part", "fn model_part(i: u32) -> vec2<f32> { return model_deck(i); }\n"),
-    (
-        "sample_part",
-        "fn sample_part(i: u32, p: vec3<f32>, lod: f32) -> Medium { return sample_medium(p, lod); }\n",
-    ),
+    ("sample_part", "fn sample_part(i: u32, p: vec3<f32>, lod: f32) -> Medium { return sample_medium(p, lod); }\n"),
 ];
 
 fn replace_model(

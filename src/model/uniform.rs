@@ -9,6 +9,7 @@ use glam::DVec2;
 use super::{
     TangentFrame,
     layers::{LayerSizes, LayerUniform, MAX_ZONES, ZoneUniform, decks},
+    places::places,
 };
 use crate::{
     settings::{CloudLayers, CloudModel, Erosion, MAX_LAYERS},
@@ -83,6 +84,8 @@ pub(crate) struct ModelUniform {
     pub skew: f32,
     pub lean: Vec4,
     pub map_offset: Vec4,
+    pub waves: Vec4,
+    pub places: Vec4,
     pub type_offset: Vec4,
     pub billow_offset: Vec4,
     pub detail_offset: Vec4,
@@ -143,10 +146,13 @@ impl ModelUniform {
     fn of_profile(model: &CloudModel, seconds: f64, frame: &TangentFrame, sizes: TexelSizes) -> Self {
         let wind = DVec2::new(model.wind.x.into(), model.wind.z.into());
         let rise = model.drift.y + f64::from(model.wind.y + model.evolution) * seconds;
-        let map = frame.map - DVec2::new(model.drift.x, model.drift.z) - wind * seconds;
+        let gone = DVec2::new(model.drift.x, model.drift.z) + wind * seconds;
+        let map = frame.map - gone;
         let turned = DVec2::new(0.8 * map.x - 0.6 * map.y, 0.6 * map.x + 0.8 * map.y);
         let group_scale = f64::from(model.map_scale) * GROUP_SCALE;
-        let own = wrapped(map, model.map_scale.into());
+        let scale = f64::from(model.map_scale);
+        let (waves, places, from) = places(map, gone, scale);
+        let own = wrapped(map + from * scale, scale);
         let group = wrapped(turned, group_scale);
         let kind = wrapped(map, model.type_scale.into());
         let volume = |scale: f32| {
@@ -183,6 +189,8 @@ impl ModelUniform {
             skew: model.wind_skew / thickness,
             lean: lean.extend(0.0).extend(0.0),
             map_offset: Vec4::new(own.x, own.y, group.x, group.y),
+            waves,
+            places,
             type_offset: kind.extend(0.0).extend(0.0),
             billow_offset: volume(model.billow_scale),
             detail_offset: volume(model.detail_scale),

@@ -9,6 +9,7 @@ use bevy::math::{DVec2, DVec3, DVec4, Vec4Swizzles};
 pub use super::texture_set::{DETAIL_SHARES, LayerSides, ModelTextures, SHAPE_SHARES};
 use super::{
     layer::Layer,
+    places::{bound_at, read_at, steepest, waves_at},
     planet::{Interval, Planet, altitude, map_position},
     profile,
     zones::{zones_at, zones_bound},
@@ -149,10 +150,7 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         let mut sum = Medium::EMPTY;
         let own = [self.model.bottom, self.model.top].map(f64::from);
         if self.has_profile() && h > own[0] && h < own[1] {
-            let one = self.sample_profile(p, h, lod);
-            if one.extinction > 0.0 {
-                sum = Medium { span: DVec2::new(h - own[0], own[1] - h), ..one };
-            }
+            sum = Medium { span: DVec2::new(h - own[0], own[1] - h), ..self.sample_profile(p, h, lod) };
         }
         for layer in self.layers() {
             let [bottom, top] = [layer.layer.bottom, layer.layer.top].map(f64::from);
@@ -206,10 +204,14 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         // The lean moves the map by up to skew metres per metre of height; a level's maximum covers half a texel.
         let wide = (reach * (1.0 + f64::from(model.skew))).log2() + 1.0;
         let level = |texel: f32| (wide - f64::from(texel)).ceil().max(0.0);
-        let mut own = self.textures.coverage_bound(self.own_map(m), level(model.texels.w));
+        let change =
+            steepest(model.places.truncate().to_array().map(f64::from)) * f64::from(model.map_rate) * wide.exp2();
+        let read = |place: DVec2| self.textures.coverage_bound(self.own_map(m) + place, level(model.texels.w));
+        let whole = || self.textures.coverage_bound(self.own_map(m), MEAN_LEVEL);
+        let mut own = bound_at(self.place_number(m), change, read, whole);
         let mut group = self.textures.coverage_bound(self.group_map(m), level(model.map_texels.x));
         if m.length() + wide.exp2() > FADE[0] {
-            own = own.max(self.textures.coverage(self.own_map(m), MEAN_LEVEL));
+            own = own.max(self.textures.coverage(self.own_map(DVec2::ZERO), MEAN_LEVEL));
             group = group.max(self.textures.coverage(self.group_map(m), MEAN_LEVEL));
         }
         let zones = zones_bound(self.zones(), m, wide.exp2());
@@ -251,6 +253,13 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         m * f64::from(self.model.map_rate) + self.model.map_offset.xy().as_dvec2()
     }
 
+    /// Number of the place that the coverage map is read at.
+    fn place_number(&self, m: DVec2) -> f64 {
+        let waves = waves_at(m * f64::from(self.model.map_rate));
+        let [phases, amplitudes] = [self.model.waves, self.model.places].map(|v| v.to_array().map(f64::from));
+        amplitudes[3] + (0..3).map(|k| amplitudes[k] * (waves[k] + phases[k]).cos()).sum::<f64>()
+    }
+
     fn group_map(&self, m: DVec2) -> DVec2 {
         let turned = DVec2::new(0.8 * m.x - 0.6 * m.y, 0.6 * m.x + 0.8 * m.y);
         turned * f64::from(self.model.group_rate) + self.model.map_offset.zw().as_dvec2()
@@ -264,14 +273,23 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
 
     fn coverage_at(&self, m: DVec2, lod: f64) -> f64 {
         let fade = smoothstep(FADE[0], FADE[1], m.length());
-        let read = |at: DVec2, rate: f32, texel: f32| {
+        let level_of = |rate: f32, texel: f32| {
             let coarsest = (-f64::from(rate).log2() - 7.0 - f64::from(texel)).max(0.0);
-            let near = self.textures.coverage(at, level(lod, texel).min(coarsest));
-            if fade > 0.0 { mix(near, self.textures.coverage(at, MEAN_LEVEL), fade) } else { near }
+            level(lod, texel).min(coarsest)
+        };
+        let faded = |near: f64| {
+            if fade > 0.0 {
+                mix(near, self.textures.coverage(self.own_map(DVec2::ZERO), MEAN_LEVEL), fade)
+            } else {
+                near
+            }
         };
         let model = &self.model;
-        let own = read(self.own_map(m), model.map_rate, model.texels.w);
-        let group = read(self.group_map(m), model.group_rate, model.map_texels.x);
+        let own_level = level_of(model.map_rate, model.texels.w);
+        let read = |place: DVec2| self.textures.coverage(self.own_map(m) + place, own_level);
+        let own = faded(read_at(self.place_number(m), read, mix));
+        let group_level = level_of(model.group_rate, model.map_texels.x);
+        let group = faded(self.textures.coverage(self.group_map(m), group_level));
         self.combine_coverage(own, group, zones_at(self.zones(), m))
     }
 

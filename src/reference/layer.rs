@@ -4,13 +4,14 @@ use bevy::math::{DVec2, DVec3, DVec4, Vec4Swizzles};
 
 use super::{
     field::{FADE, MEAN_LEVEL, Medium, ModelTextures, level, mix, smoothstep},
+    places::{bound_at, read_at, steepest, waves_at},
     planet::map_position,
     zones::{zones_at, zones_bound},
 };
-use crate::model::{FINER, LayerUniform, WAVES, ZoneUniform};
+use crate::model::{FINER, LayerUniform, ZoneUniform};
 
-/// The other place of the map that the waves choose, in repeats.
-const OTHER: DVec2 = DVec2::new(0.381966, 0.618034);
+/// How many places the waves' sum steps over where it changes by 1.
+const PLACES: f64 = 2.0;
 const RAIN_THICKENS: f64 = 3.0;
 const RAIN_ABSORBS: f64 = 0.02;
 /// Of light scattered by rain.
@@ -65,16 +66,23 @@ impl<T: ModelTextures> Layer<'_, T> {
             skew = skew.max(layer.rain_lean.as_dvec2().length());
         }
         let wide = reach * (1.0 + skew);
-        let coarse = (wide.log2() + 1.0 - f64::from(layer.texels.x)).ceil().max(0.0);
-        let at = self.map_place(m);
-        let mut most = self.read_map(at, coarse).w.max(self.read_map(at + OTHER, coarse).w);
+        let mut most = self.map_bound(m, wide);
         let away = m.length();
         if away + wide > FADE[0] {
-            most = most.max(self.read_map(at, MEAN_LEVEL).w);
+            most = most.max(self.read_map(layer.map_offset.xy().as_dvec2(), MEAN_LEVEL).w);
         }
         let far = self.far_coverage(away + wide).max(self.far_coverage((away - wide).max(0.0)));
         let added = f64::from(layer.coverage) + far + zones_bound(self.zones, m, wide);
         ((most + added) * f64::from(layer.sharpness)).clamp(0.0, 1.0)
+    }
+
+    /// Largest coverage of the map within `wide` metres, at whichever places it is read.
+    fn map_bound(&self, m: DVec2, wide: f64) -> f64 {
+        let at = self.map_place(m);
+        let change = steepest([PLACES; 3]) * f64::from(self.layer.map_rate) * wide;
+        let coarse = (wide.log2() + 1.0 - f64::from(self.layer.texels.x)).ceil().max(0.0);
+        let read = |place: DVec2| self.read_map(at + place, coarse).w;
+        bound_at(self.place_number(m), change, read, || self.read_map(at, MEAN_LEVEL).w)
     }
 
     /// The medium at `p`, whose altitude is `h`, filtered over 2^`lod` metres.
@@ -155,12 +163,12 @@ impl<T: ModelTextures> Layer<'_, T> {
         f64::from(self.layer.far_coverage) * smoothstep(start, end, away)
     }
 
-    /// How far the map is read at its other place (0 to 1).
-    fn other_share(&self, m: DVec2) -> f64 {
-        let q = m * f64::from(self.layer.map_rate);
-        let phases = self.layer.waves.to_array();
-        let sum: f64 = WAVES.iter().zip(phases).map(|(wave, phase)| (q.dot(*wave) + f64::from(phase)).sin()).sum();
-        smoothstep(-0.25, 0.25, sum)
+    /// Number of the place that the map is read at, in between where two are.
+    fn place_number(&self, m: DVec2) -> f64 {
+        let waves = waves_at(m * f64::from(self.layer.map_rate));
+        let sum: f64 =
+            waves.iter().zip(self.layer.waves.to_array()).map(|(at, from)| (at + f64::from(from)).sin()).sum();
+        PLACES * sum
     }
 
     /// Coverage, height and base of the map at `m`; w is not used.
@@ -169,14 +177,8 @@ impl<T: ModelTextures> Layer<'_, T> {
         let at = self.map_place(m);
         let coarsest = (-f64::from(layer.map_rate).log2() - 7.0 - f64::from(layer.texels.x)).max(0.0);
         let level = level(lod, layer.texels.x).min(coarsest);
-        let share = self.other_share(m);
-        let mut w = DVec4::ZERO;
-        if share < 1.0 {
-            w = self.read_map(at, level);
-        }
-        if share > 0.0 {
-            w = w.lerp(self.read_map(at + OTHER, level), share);
-        }
+        let read = |place: DVec2| self.read_map(at + place, level);
+        let mut w = read_at(self.place_number(m), read, DVec4::lerp);
         let away = m.length();
         let fade = smoothstep(FADE[0], FADE[1], away);
         if fade > 0.0 {

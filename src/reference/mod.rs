@@ -22,10 +22,13 @@ pub mod mie;
 pub(crate) mod path_tracer;
 pub mod phase;
 pub mod phase_table;
+mod places;
 pub mod planet;
 pub mod profile;
 pub mod quadrature;
 pub mod query;
+#[cfg(test)]
+mod repetition;
 pub mod sampler;
 pub(crate) mod texture_set;
 mod zones;

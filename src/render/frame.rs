@@ -141,12 +141,7 @@ impl FrameUniform {
             ),
             size: UVec4::new(size.x, size.y, quality.divisor(), window.index & 255),
             viewport: *viewport,
-            counts: UVec4::new(
-                quality.max_steps,
-                quality.light_steps,
-                input.octaves.ceil() as u32,
-                phases.count(),
-            ),
+            counts: UVec4::new(quality.max_steps, quality.light_steps, input.octaves.ceil() as u32, phases.count()),
             flags: UVec4::new(
                 quality.long_step,
                 quality.empty_steps,

@@ -167,8 +167,9 @@ pub struct CloudLayer {
     /// Wind velocity (m/s, world axes; y moves the noise upward). Default (8, 0, 3).
     #[reflect(@-300.0..=300.0_f32)]
     pub wind: Vec3,
-    /// Horizontal lean of a cloud's top along the wind, which shear over its height makes (m over `thickness`).
-    /// Default 250.
+    /// Horizontal lean of a cloud's top along the wind (m over `thickness`): shear over the height of one layer, whose clouds
+    /// drift as a whole. Layers at other altitudes have winds of their own, as
+    /// [`WindProfile`](crate::weather::WindProfile) gives them. Default 250.
     #[reflect(@-20_000.0..=20_000.0_f32)]
     pub wind_skew: f32,
     /// Rise of the noise through the clouds (m/s): shapes evolve instead of only sliding. Default 0.8.

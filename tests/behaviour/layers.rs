@@ -278,7 +278,7 @@ fn put(app: &mut App, layers: &[CloudLayer]) {
 
 #[test]
 fn an_empty_gap_between_decks_costs_next_to_nothing() {
-    let low = CloudLayer { map: map(6.0), extinction: 0.002, base_rise: 0.0, ..cumulus() };
+    let low = CloudLayer { map: map(7.0), coverage: 0.3, extinction: 0.002, base_rise: 0.0, ..cumulus() };
     let high = CloudLayer { base: 11_000.0, base_rise: 0.0, thickness: 1500.0, ..low.clone() };
     let (mut app, view) = above_us(&[low.clone(), high.clone()]);
     let of = |app: &mut App| (steps(app, &view), cloud_pixels(app, &view));
@@ -301,6 +301,57 @@ fn an_empty_gap_between_decks_costs_next_to_nothing() {
     assert!(in_both > 10 && low > 5.0 && high > 5.0, "{in_both} pixels see both, {low} and {high} steps");
     // Of rounding, and a step into the gap.
     assert!(most < 4.0, "{most} steps in the gap of 8 km");
+}
+
+/// An app whose camera on the ground looks at the horizon; low clouds end at 40 km.
+fn far_away(layers: &[CloudLayer]) -> (App, View) {
+    let (mut app, view) = above_us(layers);
+    app.insert_resource(CloudQuality { max_distance: 40_000.0, ..exact(MarchResolution::Full) });
+    let looking = Transform::from_xyz(0.0, 10.0, 0.0).looking_to(Vec3::new(0.0, 0.06, -1.0), Vec3::Y);
+    let narrow = PerspectiveProjection { fov: 0.15, ..default() };
+    app.world_mut().entity_mut(view.camera).insert((looking, Projection::Perspective(narrow)));
+    settle(&mut app);
+    (app, view)
+}
+
+#[test]
+fn how_far_a_layer_is_seen_is_its_own_affair() {
+    let low = CloudLayer { map: map(5.0), ..cumulus() };
+    let high = CloudLayer { map: map(8.0), coverage: 1.0, extinction: 0.01, ..cirrus() };
+    let hidden = CloudLayer { coverage: -1.0, ..high.clone() };
+    let (mut app, view) = far_away(&[low.clone()]);
+    let alone = cloud_pixels(&app, &view);
+    assert!(alone.iter().any(|p| p.w < 0.9) && alone.iter().any(|p| p.w == 1.0), "there is cloud and sky: {alone:?}");
+    put(&mut app, &[low.clone(), hidden]);
+    for (k, (alone, now)) in alone.iter().zip(cloud_pixels(&app, &view)).enumerate() {
+        assert!((*alone - now).abs().max_element() <= 1e-4 * alone.max_element().max(1.0), "{k}: {alone} and {now}");
+    }
+    // The high one itself is there where the low one has ended: 3.4° up it is 110 km away.
+    put(&mut app, &[high]);
+    let [row, width] = [SIZE.y / 2, SIZE.x];
+    let middle = &cloud_pixels(&app, &view)[(row * width) as usize..][..width as usize];
+    assert!(middle.iter().all(|p| p.w < 0.5), "{middle:?}");
+}
+
+#[test]
+fn a_layer_without_cloud_changes_no_light() {
+    let clouds = [CloudLayer { map: map(6.0), ..cumulus() }, CloudLayer { extinction: 0.004, ..cirrus() }];
+    // From the ground to over both, it joins them to one deck.
+    let hidden = CloudLayer { base: 300.0, thickness: 10_000.0, coverage: -1.0, ..cumulus() };
+    let (mut app, view) = above_us(&clouds);
+    // So fine that it does not matter where steps begin.
+    let fine =
+        CloudQuality { step: 12.0, step_growth: 0.001, max_steps: 4000, long_step: 1, ..exact(MarchResolution::Full) };
+    app.insert_resource(fine);
+    settle(&mut app);
+    let alone = cloud_pixels(&app, &view);
+    put(&mut app, &[&clouds[..], &[hidden]].concat());
+    let now = cloud_pixels(&app, &view);
+    let light = |all: &[Vec4]| all.iter().map(|p| p.y).sum::<f32>() / all.len() as f32;
+    let differs = alone.iter().zip(&now).map(|(a, b)| (a.y - b.y).abs()).sum::<f32>() / alone.len() as f32;
+    println!("light {} and {}, pixels differ by {differs}", light(&alone), light(&now));
+    assert!(light(&alone) > 500.0, "there is no cloud");
+    assert!(differs < 0.01 * light(&alone), "light {} and {}, pixels differ by {differs}", light(&alone), light(&now));
 }
 
 #[test]

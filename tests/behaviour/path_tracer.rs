@@ -40,7 +40,7 @@ pub fn mixed_slab(depth: f64, [r, g, b]: [f64; 3], [p, q, s, t]: [f64; 4]) -> Mo
         fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
             let h = altitude(p, {PLANET_RADIUS:?});
             if h < {BOTTOM:?} || h > {top:?} {{ return empty_medium(); }}
-            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, vec2(500.0),
+            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, vec2(h - {BOTTOM:?}, {top:?} - h),
                 vec4({p:?}, {q:?}, {s:?}, {t:?}));
         }}"
     ))
@@ -124,6 +124,39 @@ fn transmittance_and_single_scattering_are_the_closed_forms() {
         };
         assert_near(r, sun * integral, 0.01, &format!("single scattering at μ = {mu}"));
     }
+}
+
+#[test]
+fn clouds_merge_with_the_background_as_in_the_march() {
+    let (depth, end, start) = (6.0, 700.0, 0.2);
+    let mut app = traced_app(Some(slab(depth, [0.9; 3])), sun_light(PhaseFunction::Isotropic));
+    app.world_mut().resource_mut::<CloudLighting>().fade_start = start as f32;
+    app.world_mut().resource_mut::<CloudQuality>().max_distance = end as f32;
+    spawn_sun(&mut app, Vec3::NEG_Y);
+    let view = spawn_pinhole(&mut app, UVec2::new(96, 64), 1.0);
+    // From 20 m on; what is lost of the light behind, by how much of it is shown.
+    let (steps, extinction) = (20_000, depth / THICKNESS);
+    let dt = (end - 20.0) / f64::from(steps);
+    let opacity: f64 = (0..steps)
+        .map(|k| {
+            let t = (f64::from(k) + 0.5) * dt;
+            let u = ((t + 20.0 - start * end) / (end - start * end)).clamp(0.0, 1.0);
+            extinction * dt * (-extinction * t).exp() * (1.0 - u * u * (3.0 - 2.0 * u))
+        })
+        .sum();
+    let [.., traced] = mean(&mut app, &view, 40);
+    assert_near(1.0 - traced, opacity, 0.01, "path-traced opacity");
+    let fine = CloudQuality {
+        step: 4.0,
+        step_growth: 0.0,
+        max_steps: 1000,
+        transmittance_stop: 0.0,
+        offsets: false,
+        ..default()
+    };
+    app.insert_resource(CloudQuality { temporal: TemporalMode::Off, max_distance: end as f32, ..fine });
+    let [.., marched] = mean(&mut app, &view, 2);
+    assert_near(1.0 - marched, opacity, 0.01, "marched opacity");
 }
 
 #[test]

@@ -46,7 +46,8 @@ impl LightMix {
         let octaves = self.octaves_to(other, s);
         let mut phases: Vec<(CloudPhase, f32)> = Vec::new();
         let both = [(self, 1.0 - s), (other, s)];
-        for (phase, share) in both.iter().flat_map(|(of, part)| of.phases.iter().map(|(p, x)| (*p, *x * *part as f32))) {
+        for (phase, share) in both.iter().flat_map(|(of, part)| of.phases.iter().map(|(p, x)| (*p, *x * *part as f32)))
+        {
             match phases.iter_mut().find(|(known, _)| *known == phase) {
                 Some((_, sum)) => *sum += share,
                 None => phases.push((phase, share)),

@@ -3,7 +3,7 @@
 use bevy::math::DVec3;
 
 use super::{sky::Leg, *};
-use crate::settings::MAX_LAYERS;
+use crate::settings::{CloudPhase, MAX_LAYERS, PhaseFunction};
 
 /// Cloud time at which the tests begin: months of wind have passed.
 const BEGIN: f64 = 1.0e7;
@@ -51,6 +51,60 @@ fn jump(before: &CloudLayer, now: &CloudLayer, [t0, t1]: [f64; 2]) -> Option<Str
         .then(|| format!("{}: another phase function", now.name))
 }
 
+/// What would make the light jump: its numbers, its mixture of phase functions, its octaves.
+fn light_jump(before: &Sky, now: &Sky) -> Option<String> {
+    let shares = |sky: &Sky| sky.light.phases.iter().map(|(_, share)| share).sum::<f32>();
+    if (shares(now) - 1.0).abs() > 1e-5 {
+        return Some(format!("shares of phase functions sum up to {}", shares(now)));
+    }
+    let of = |sky: &Sky, phase: &CloudPhase| {
+        let near = |other: &CloudPhase| {
+            other.function == phase.function
+                && (other.g - phase.g).abs() < 0.02
+                && (other.g_back - phase.g_back).abs() < 0.02
+                && (other.lobe_mix - phase.lobe_mix).abs() < 0.02
+                && (other.halo - phase.halo).abs() < 0.02
+                && (other.droplet_diameter - phase.droplet_diameter).abs() < 0.5
+        };
+        sky.light.phases.iter().filter(|(other, _)| near(other)).map(|(_, share)| share).sum::<f32>()
+    };
+    for (phase, _) in before.light.phases.iter().chain(&now.light.phases) {
+        let [a, b] = [of(before, phase), of(now, phase)];
+        if (a - b).abs() > 0.02 {
+            return Some(format!("the share of {:?} jumps from {a} to {b}", phase.function));
+        }
+    }
+    if !now.light.phases.iter().any(|(phase, _)| *phase == CloudPhase::from(&now.lighting)) {
+        return Some(format!("the fields name {:?}, which is not there", now.lighting.phase));
+    }
+    let numbers = |sky: &Sky| {
+        let l = &sky.lighting;
+        let [tint, sky_light, ground] = [l.ambient_tint, l.sky_fallback, l.ground_albedo].map(|v| v.max_element());
+        [
+            ("octaves", sky.light.octaves, 0.05),
+            ("attenuation", l.attenuation, 0.02),
+            ("contribution", l.contribution, 0.02),
+            ("eccentricity", l.eccentricity, 0.02),
+            ("diffusion", l.diffusion, 0.2),
+            ("diffusion_asymmetry", l.diffusion_asymmetry, 0.02),
+            ("phase_limit", l.phase_limit / 100.0, 0.2),
+            ("sun_strength", l.sun_strength, 0.05),
+            ("ambient_strength", l.ambient_strength, 0.05),
+            ("ambient_tint", tint, 0.05),
+            ("ambient_desaturation", l.ambient_desaturation, 0.02),
+            ("sky_fallback", sky_light, 0.01),
+            ("ground_albedo", ground, 0.02),
+            ("powder", l.powder, 0.02),
+            ("aerial_perspective", l.aerial_perspective, 0.02),
+            ("fade_start", l.fade_start, 0.02),
+        ]
+    };
+    let mut pairs = numbers(before).into_iter().zip(numbers(now));
+    pairs
+        .find(|((_, a, most), (_, b, _))| (a - b).abs() > *most)
+        .map(|((what, a, _), (_, b, _))| format!("lighting.{what} jumps from {a} to {b}"))
+}
+
 /// Walks through a change and fails at the first jump.
 fn walk(name: &str, at: impl Fn(f64) -> Sky, [from, to]: [f64; 2]) {
     let step = SECONDS / 400.0;
@@ -61,6 +115,7 @@ fn walk(name: &str, at: impl Fn(f64) -> Sky, [from, to]: [f64; 2]) {
         sky.layers.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
         sky.model.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
         sky.lighting.validate().unwrap_or_else(|error| panic!("{name}: {error}"));
+        assert_eq!(light_jump(&before, &sky), None, "{name} at {}", t - BEGIN);
         let (olds, news) = (&before.layers.0, &sky.layers.0);
         assert!(news.len() <= MAX_LAYERS, "{name}: {} layers", news.len());
         let mut left: Vec<&CloudLayer> = olds.iter().collect();
@@ -126,6 +181,37 @@ fn a_restart_midway_does_not_jump_and_holds_eight_layers() {
     let first = weather.legs[0].span.begin;
     let at = |t: f64| weather.leg(t).expect("a leg").at(t);
     walk("one after the other", at, [first - 1.0, BEGIN + 17.0 * all.len() as f64 + SECONDS]);
+}
+
+#[test]
+fn phase_functions_and_octaves_change_by_degrees() {
+    let light = |phase: PhaseFunction, octaves: u32, g: f32, halo: f32| {
+        let lighting = CloudLighting { phase, octaves, g, halo, ..CloudLighting::default() };
+        CloudPreset { lighting, ..all()[0].1.clone() }
+    };
+    let presets = [
+        light(PhaseFunction::HgDraine, 3, 0.8, 0.0),
+        light(PhaseFunction::Ice, 1, 0.8, 0.2),
+        light(PhaseFunction::Ice, 5, 0.8, 0.9),
+        light(PhaseFunction::HenyeyGreenstein, 2, 0.8, 0.0),
+        light(PhaseFunction::HenyeyGreenstein, 4, -0.4, 0.0),
+        light(PhaseFunction::Isotropic, 0, 0.0, 0.0),
+    ];
+    let mut weather = CloudWeather::default();
+    for (k, preset) in presets.iter().enumerate().skip(1) {
+        // Each cuts the last one short.
+        weather.transition_at(preset, BEGIN + 40.0 * k as f64, SECONDS).expect("a good preset");
+    }
+    weather.take_in(&sky(&presets[0]), BEGIN);
+    let at = |t: f64| weather.leg(t).expect("a leg").at(t);
+    let end = BEGIN + 40.0 * presets.len() as f64 + SECONDS;
+    walk("one light after the other", at, [BEGIN, end]);
+    assert_eq!(at(end).lighting, presets[5].lighting);
+    assert_eq!(at(end).light, LightMix::from(&presets[5].lighting));
+    assert!(
+        (0..400).any(|k| at(BEGIN + 0.5 * f64::from(k)).light.phases.len() > 2),
+        "a restart forgets what was there"
+    );
 }
 
 #[test]
