@@ -219,7 +219,7 @@ fn numbers(field: &dyn PartialReflect) -> Vec<(&'static str, f64)> {
     }
 }
 
-/// The range on the field at this path below a type, such as `-1 to 1`; of a vector's parts, the vector's.
+/// What the field at this path below a type takes, such as `a number from -1 to 1`; of a vector's parts, what each takes.
 pub(super) fn range_at(info: &'static TypeInfo, path: &str) -> Option<String> {
     let (name, rest) = path.split_once('.').map_or((path, None), |(name, rest)| (name, Some(rest)));
     match info {
@@ -234,8 +234,11 @@ pub(super) fn range_at(info: &'static TypeInfo, path: &str) -> Option<String> {
 }
 
 fn range_on(field: &NamedField) -> Option<String> {
-    let whole = field.get_attribute::<RangeInclusive<u32>>().map(|r| format!("{} to {}", r.start(), r.end()));
-    whole.or_else(|| field.get_attribute::<RangeInclusive<f32>>().map(|r| format!("{} to {}", r.start(), r.end())))
+    if let Some(range) = field.get_attribute::<RangeInclusive<u32>>() {
+        return Some(format!("a whole number from {} to {}", range.start(), range.end()));
+    }
+    let range = field.get_attribute::<RangeInclusive<f32>>()?;
+    Some(format!("a number from {} to {}", range.start(), range.end()))
 }
 
 fn out_of_range<T: ToString, R: ToString>(field: &str, value: T, min: &R, max: &R) -> SettingsError {

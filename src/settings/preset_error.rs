@@ -55,7 +55,7 @@ pub enum PresetError {
         field: Option<String>,
         /// Why.
         source: Box<ron::Error>,
-        /// The range of that field, where its value is no number.
+        /// What that field takes, where its value is no such number.
         range: Option<String>,
     },
     /// A field is out of its range.
@@ -95,7 +95,9 @@ impl PresetError {
         // The span begins before white space.
         let at = skip_space(text, offset(text, begins.line, begins.col));
         let field = Places::of(text).around(at).map(str::to_owned);
-        let range = field.as_deref().filter(|_| is_wrong_value(&error.code));
+        // A fraction where a whole number should be.
+        let is_cut_off = error.code == ron::Error::ExpectedComma && text[at..].starts_with('.');
+        let range = field.as_deref().filter(|_| is_cut_off || is_wrong_value(&error.code));
         let range = range.and_then(|path| range_at(CloudPreset::type_info(), path));
         Self::Parse { place: PresetPlace::new(text, file, at), field, source: Box::new(error.code), range }
     }

@@ -360,7 +360,7 @@ mod tests {
     #[test]
     fn lines_and_columns_count_characters() {
         let text = "é\nüb c\n";
-        for (line, column, at) in [(1, 1, 0), (1, 2, 2), (2, 1, 3), (2, 3, 6), (3, 1, 8)] {
+        for (line, column, at) in [(1, 1, 0), (1, 2, 2), (2, 1, 3), (2, 3, 6), (3, 1, 9)] {
             assert_eq!(offset(text, line, column), at, "{line}:{column}");
             assert_eq!(line_and_column(text, at), (line, column));
         }

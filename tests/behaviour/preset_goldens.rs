@@ -21,43 +21,45 @@ use crate::{
 };
 
 /// The mean transmittance, least and most, of each preset's clouds as seen from the ground: wide enough for a preset to be
-/// retuned, and too narrow for a sky that is empty, or closed by what is no deck. Half of the view, or nearly, is sky.
+/// retuned, and too narrow for a sky that is empty, or closed by what is no deck: then it would be 1, or 0.25, since a quarter
+/// of the view is ground.
 const FROM_THE_GROUND: [(&str, [f32; 2]); 22] = [
-    ("ClearDay", [0.0, 1.0]),
-    ("FairWeather", [0.0, 1.0]),
-    ("Overcast", [0.0, 1.0]),
-    ("Sunset", [0.0, 1.0]),
-    ("Cirrus", [0.0, 1.0]),
-    ("Cirrocumulus", [0.0, 1.0]),
-    ("Cirrostratus", [0.0, 1.0]),
-    ("Altocumulus", [0.0, 1.0]),
-    ("Altostratus", [0.0, 1.0]),
-    ("Nimbostratus", [0.0, 1.0]),
-    ("Stratocumulus", [0.0, 1.0]),
-    ("Stratus", [0.0, 1.0]),
-    ("Cumulus", [0.0, 1.0]),
-    ("Cumulonimbus", [0.0, 1.0]),
-    ("FairWeatherCumulus", [0.0, 1.0]),
-    ("ToweringCumulus", [0.0, 1.0]),
-    ("Broken", [0.0, 1.0]),
-    ("Storm", [0.0, 1.0]),
-    ("WinterStratus", [0.0, 1.0]),
-    ("MackerelSky", [0.0, 1.0]),
-    ("RedSunset", [0.0, 1.0]),
-    ("AfterRain", [0.0, 1.0]),
+    ("ClearDay", [0.6, 0.998]),
+    ("FairWeather", [0.4, 0.95]),
+    ("Overcast", [0.2, 0.45]),
+    ("Sunset", [0.4, 0.95]),
+    ("Cirrus", [0.6, 0.998]),
+    ("Cirrocumulus", [0.4, 0.95]),
+    ("Cirrostratus", [0.27, 0.9]),
+    ("Altocumulus", [0.27, 0.9]),
+    ("Altostratus", [0.2, 0.5]),
+    ("Nimbostratus", [0.2, 0.4]),
+    ("Stratocumulus", [0.2, 0.6]),
+    ("Stratus", [0.2, 0.4]),
+    ("Cumulus", [0.27, 0.9]),
+    ("Cumulonimbus", [0.4, 0.95]),
+    ("FairWeatherCumulus", [0.27, 0.9]),
+    ("ToweringCumulus", [0.27, 0.9]),
+    ("Broken", [0.2, 0.6]),
+    ("Storm", [0.27, 0.8]),
+    ("WinterStratus", [0.2, 0.4]),
+    ("MackerelSky", [0.27, 0.8]),
+    ("RedSunset", [0.27, 0.9]),
+    ("AfterRain", [0.27, 0.9]),
 ];
-/// The same from above, of skies that are tall or high.
-const FROM_ABOVE: [(&str, [f32; 2]); 3] = [("Cumulonimbus", [0.0, 1.0]), ("Cirrus", [0.0, 1.0]), ("Storm", [0.0, 1.0])];
+/// The same from above (no ground is near: 0 would be closed), of skies that are tall or high.
+const FROM_ABOVE: [(&str, [f32; 2]); 3] =
+    [("Cumulonimbus", [0.4, 0.97]), ("Cirrus", [0.6, 0.998]), ("Storm", [0.05, 0.8])];
 /// Over all of them.
 const ABOVE: &str = "0,14000,0,0,-20";
 
 /// Brighter than any cloud (cd/m²): sunlight, all of it scattered into one direction by ice's forward peak, would be.
 const BRIGHTEST: f32 = 1e7;
 
-/// Small, and made from small textures; maps of layers follow.
+/// Small, of one frame, and made from small textures; maps of layers follow. Most of the time goes to Bevy's atmosphere.
 #[rustfmt::skip]
 const SMALL: [&str; 10] = [
-    "--size", "96x54", "--frames", "3", "--quality", "medium",
+    "--size", "96x54", "--frames", "1", "--quality", "medium",
     "--set", "textures.volume_size=32", "--set", "textures.map_size=128",
 ];
 

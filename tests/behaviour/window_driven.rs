@@ -6,6 +6,7 @@
 mod screen;
 
 use std::{
+    fs,
     process::Command,
     thread::sleep,
     time::{Duration, Instant},
@@ -13,7 +14,7 @@ use std::{
 
 use bevy_cumulus::settings::CloudPreset;
 
-use crate::gpu::webgpu_limits;
+use crate::{gpu::webgpu_limits, headless::Folder};
 use screen::{PATIENCE, Part, Picture, SCREEN, Screen, binary, wait};
 
 // Where things are in a window of 640 by 270, without help and panel.
@@ -206,6 +207,33 @@ fn a_dragged_slider_changes_the_clouds_and_a_saved_preset_loads_back() {
 
     with_file(&mut screen, "before.clouds.ron", LOAD, |screen| (screen.picture().grey(SKY) < few + 0.1).then_some(()));
     assert_eq!(save(&mut screen, "again.clouds.ron"), before, "what was saved loads back identical");
+}
+
+#[test]
+fn a_preset_file_is_read_again_when_it_is_saved() {
+    if in_the_other_run() {
+        return;
+    }
+    let folder = Folder::new();
+    let file = folder.join("sky.ron");
+    let write = |coverage: &str| {
+        let small = "textures: (volume_size: 32, map_size: 128)";
+        fs::write(&file, format!("(\n  model: (coverage: {coverage}),\n  {small},\n)")).expect("written");
+    };
+    write("0.0");
+    let (mut screen, clouds) = fly(&["--preset", &file.display().to_string()]);
+    let few = clouds.grey(SKY);
+    write("0.5");
+    screen.wait_for("the file to bring cloud", |now| now.grey(SKY) > few + 0.15);
+    write("7");
+    let wrong = format!("{}:2:11: model.coverage = 7 is outside its range -1 to 1", file.display());
+    let log = screen.folder.join("program.log");
+    wait("an error", PATIENCE, || fs::read_to_string(&log).ok().filter(|log| log.contains(&wrong)));
+    assert!(screen.picture().grey(SKY) > few + 0.15, "the last good sky is gone");
+    write("0.0");
+    wait("the good file", PATIENCE, || (screen.picture().grey(SKY) < few + 0.1).then_some(()));
+    let log = fs::read_to_string(&log).expect("the program has a log");
+    assert_eq!(log.matches("ERROR").count(), 1, "{log}");
 }
 
 #[test]
