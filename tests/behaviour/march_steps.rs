@@ -19,6 +19,8 @@ fn mean(values: impl Iterator<Item = f32> + Clone) -> f32 {
 /// The built-in clouds from the ground, each step where it always is.
 fn built_in() -> (App, View) {
     let mut app = clouds_app();
+    // A map whose texels are not as wide as the gaps between clouds: else nothing is known to be empty.
+    app.insert_resource(CloudTextures { volume_size: 32, map_size: 512, ..default() });
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()));
     let view = spawn_linear(&mut app, SIZE, up);
@@ -53,8 +55,8 @@ fn long_steps_through_empty_air_miss_nothing() {
     let open = |steps: &[f32]| mean(uniform.iter().zip(steps).filter(|(p, _)| p.w > 0.999).map(|(_, steps)| *steps));
     let (uniform_open, adaptive_open) = (open(&uniform_steps), open(&adaptive_steps));
     println!("{clear} clear pixels: {uniform_open} steps, with long ones {adaptive_open}; {cloudy} cloudy ones");
-    // A quarter where all air is known to be empty; near cloud it is not.
-    assert!(adaptive_open < 0.6 * uniform_open, "{adaptive_open} steps in place of {uniform_open}");
+    // A quarter where all air is known to be empty; near cloud it is not, and asking costs a step in four.
+    assert!(adaptive_open < 0.9 * uniform_open, "{adaptive_open} steps in place of {uniform_open}");
     assert!(adaptive_open > 0.24 * uniform_open, "{adaptive_open} steps: a long one is four small ones, not more");
 }
 
@@ -69,7 +71,8 @@ fn growing_steps_change_little_with_long_ones() {
     let (brighter, clearer) = (bright(&adaptive) / bright(&uniform) - 1.0, through(&adaptive) - through(&uniform));
     let apart = mean(uniform.iter().zip(&adaptive).map(|(a, b)| (a.w - b.w).abs()));
     println!("brighter by {brighter}, clearer by {clearer}, {apart} apart in the mean");
-    assert!(brighter.abs() < 0.01 && clearer.abs() < 0.01 && apart < 0.01);
+    // The march's own noise, several times over: a step of 60 m for one of 40 is as far from it.
+    assert!(brighter.abs() < 2e-3 && clearer.abs() < 2e-3 && apart < 2e-3);
 }
 
 #[test]
