@@ -19,6 +19,8 @@ fn mean(values: impl Iterator<Item = f32> + Clone) -> f32 {
 /// The built-in clouds from the ground, each step where it always is.
 fn built_in() -> (App, View) {
     let mut app = clouds_app();
+    // A map whose texels are not as wide as the gaps between clouds: else nothing is known to be empty.
+    app.insert_resource(CloudTextures { volume_size: 32, map_size: 512, ..default() });
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()));
     let view = spawn_linear(&mut app, SIZE, up);
@@ -38,24 +40,33 @@ fn long_steps_through_empty_air_miss_nothing() {
     let (mut app, view) = built_in();
     // Small steps fall on the same places, whether or not long ones come between.
     let quality = |long_step| CloudQuality { long_step, step: 60.0, step_growth: 0.0, ..exact(MarchResolution::Full) };
-    let uniform = seen_with(&mut app, &view, quality(1));
-    let uniform_steps = steps(&mut app, &view);
-    let adaptive = seen_with(&mut app, &view, quality(4));
-    let adaptive_steps = steps(&mut app, &view);
-    for (k, (a, b)) in uniform.iter().zip(&adaptive).enumerate() {
-        // The last place of f16: the two shaders' sums may differ by one of f32.
-        assert!((a.w - b.w).abs() <= 1e-3, "pixel {k}: {} and {} pass", a.w, b.w);
-        assert!((a.xyz() - b.xyz()).abs().max_element() <= 1e-3 * a.xyz().max_element(), "pixel {k}: {a} and {b}");
+    for coverage in [0.0, -0.5, -1.0] {
+        app.world_mut().resource_mut::<CloudModel>().coverage = coverage;
+        let uniform = seen_with(&mut app, &view, quality(1));
+        let uniform_steps = steps(&mut app, &view);
+        let adaptive = seen_with(&mut app, &view, quality(4));
+        let adaptive_steps = steps(&mut app, &view);
+        for (k, (a, b)) in uniform.iter().zip(&adaptive).enumerate() {
+            // The last place of f16, though the same is added up.
+            assert!((a.w - b.w).abs() <= 1e-3, "{coverage}, pixel {k}: {} and {} pass", a.w, b.w);
+            assert!((a.xyz() - b.xyz()).abs().max_element() <= 1e-3 * a.xyz().max_element(), "pixel {k}: {a} and {b}");
+        }
+        let is_open = |p: &Vec4| p.w > 0.999;
+        let (open, cloudy) = (uniform.iter().filter(|p| is_open(p)), uniform.iter().filter(|p| p.w < 0.5));
+        let (open, cloudy) = (open.count(), cloudy.count());
+        let of_open = |steps: &[f32]| mean(uniform.iter().zip(steps).filter(|(p, _)| is_open(p)).map(|(_, n)| *n));
+        let ratio = of_open(&adaptive_steps) / of_open(&uniform_steps);
+        println!("coverage {coverage}: {open} open pixels, where {ratio} of the steps are left; {cloudy} cloudy ones");
+        assert!(open > 20 && (coverage < 0.0 || cloudy > 20), "{coverage}: {open} open and {cloudy} cloudy pixels");
+        // Where a model's bound sees what its noise takes away, asking costs a step in four; in a clear sky the long step
+        // is four small ones.
+        let most = match coverage {
+            0.0 => 1.26,
+            -0.5 => 1.0,
+            _ => 0.27,
+        };
+        assert!((0.245..most).contains(&ratio), "coverage {coverage}: {ratio} of the steps are left in open sky");
     }
-    let share = |of: fn(&Vec4) -> bool| uniform.iter().filter(|p| of(p)).count();
-    let (clear, cloudy) = (share(|p| p.w > 0.999), share(|p| p.w < 0.5));
-    assert!(clear > 30 && cloudy > 30, "{clear} clear and {cloudy} cloudy pixels");
-    let open = |steps: &[f32]| mean(uniform.iter().zip(steps).filter(|(p, _)| p.w > 0.999).map(|(_, steps)| *steps));
-    let (uniform_open, adaptive_open) = (open(&uniform_steps), open(&adaptive_steps));
-    println!("{clear} clear pixels: {uniform_open} steps, with long ones {adaptive_open}; {cloudy} cloudy ones");
-    // A quarter where all air is known to be empty; near cloud it is not.
-    assert!(adaptive_open < 0.6 * uniform_open, "{adaptive_open} steps in place of {uniform_open}");
-    assert!(adaptive_open > 0.24 * uniform_open, "{adaptive_open} steps: a long one is four small ones, not more");
 }
 
 #[test]
@@ -69,7 +80,8 @@ fn growing_steps_change_little_with_long_ones() {
     let (brighter, clearer) = (bright(&adaptive) / bright(&uniform) - 1.0, through(&adaptive) - through(&uniform));
     let apart = mean(uniform.iter().zip(&adaptive).map(|(a, b)| (a.w - b.w).abs()));
     println!("brighter by {brighter}, clearer by {clearer}, {apart} apart in the mean");
-    assert!(brighter.abs() < 0.01 && clearer.abs() < 0.01 && apart < 0.01);
+    // The march's own noise, several times over: a step of 60 m for one of 40 is as far from it.
+    assert!(brighter.abs() < 2e-3 && clearer.abs() < 2e-3 && apart < 2e-3);
 }
 
 #[test]

@@ -1,7 +1,5 @@
 //! What is in the baked textures.
 
-use std::ops::Range;
-
 use bevy::prelude::*;
 use bevy_cumulus::{
     settings::CloudTextures,
@@ -35,35 +33,35 @@ fn step_between(captured: &Captured, axis: usize, at: i32, channel: usize) -> (f
     (most, sum / count)
 }
 
-/// The seam must be as smooth as the inside, judged by mean and by largest step.
-fn assert_tiles(captured: &Captured, axes: usize, channels: Range<usize>, what: &str) {
+/// The seam must be as smooth as the inside, judged by mean and by largest step, the latter times `room`.
+fn assert_tiles(captured: &Captured, axes: usize, channel: usize, room: f32, what: &str) {
     for axis in 0..axes {
         let last = captured.size[axis] as i32 - 1;
-        for channel in channels.clone() {
-            let inside: Vec<_> = (0..last).map(|at| step_between(captured, axis, at, channel)).collect();
-            let most = inside.iter().map(|step| step.0).fold(0.0, f32::max);
-            let mean = inside.iter().map(|step| step.1).fold(0.0, f32::max);
-            let seam = step_between(captured, axis, last, channel);
-            assert!(
-                seam.0 <= most * 1.02 && seam.1 <= mean * 1.1,
-                "{what}, axis {axis}, channel {channel}: steps of {seam:?} at the seam, {most} and {mean} inside"
-            );
-        }
+        let inside: Vec<_> = (0..last).map(|at| step_between(captured, axis, at, channel)).collect();
+        let most = inside.iter().map(|step| step.0).fold(0.0, f32::max);
+        let mean = inside.iter().map(|step| step.1).fold(0.0, f32::max);
+        let seam = step_between(captured, axis, last, channel);
+        assert!(
+            seam.0 <= most * room && seam.1 <= mean * 1.1,
+            "{what}, axis {axis}, channel {channel}: steps of {seam:?} at the seam, {most} and {mean} inside"
+        );
     }
 }
 
-/// Three levels of a volume whose finest channel has cells of four texels: with smaller ones, in coarser mips too, noise
+/// A volume whose finest channel has cells of four texels: with smaller ones, in coarser mips too, noise
 /// changes by half its range from texel to texel, where no seam would show.
 const SEAMS: CloudTextures = CloudTextures { volume_size: 64, billow_cells: 2, wisp_cells: 2, ..SMALL };
 
-/// Each level of each channel whose cells are at least four texels wide there; what it is, and its number.
-fn resolved_channels(app: &App) -> Vec<(String, Captured, usize)> {
+/// Each level of each channel whose cells are at least four texels wide there: what it is, its number, and the room that
+/// its largest step has: of the few texels of a mip the largest is a matter of chance.
+fn resolved_channels(app: &App) -> Vec<(String, Captured, usize, f32)> {
     let mut all = Vec::new();
     for slot in [CloudTextureSlot::Billow, CloudTextureSlot::Wisp] {
         for level in 0..4_u32 {
             let captured = read(app, slot, level);
             for channel in 0..4 - level as usize {
-                all.push((format!("{slot}, level {level}"), captured.clone(), channel));
+                let room = if level == 0 { 1.02 } else { 1.3 };
+                all.push((format!("{slot}, level {level}"), captured.clone(), channel, room));
             }
         }
     }
@@ -75,11 +73,11 @@ fn noise_volumes_and_maps_tile() {
     let app = baked(SEAMS);
     let volumes = resolved_channels(&app);
     assert_eq!(volumes.len(), 20);
-    for (what, captured, channel) in volumes {
-        assert_tiles(&captured, 3, channel..channel + 1, &what);
+    for (what, captured, channel, room) in volumes {
+        assert_tiles(&captured, 3, channel, room, &what);
     }
     for slot in [CloudTextureSlot::Coverage, CloudTextureSlot::TypeMap] {
-        assert_tiles(&read(&app, slot, 0), 2, 0..1, &slot.to_string());
+        assert_tiles(&read(&app, slot, 0), 2, 0, 1.02, &slot.to_string());
     }
 }
 
@@ -91,15 +89,15 @@ fn cut(captured: &Captured, depth: u32) -> Captured {
 
 #[test]
 fn the_seam_check_sees_a_seam() {
-    let sees = |captured: &Captured, axes, channel: usize| {
-        std::panic::catch_unwind(|| assert_tiles(captured, axes, channel..channel + 1, "a seam")).is_err()
+    let sees = |captured: &Captured, axes, channel, room| {
+        std::panic::catch_unwind(|| assert_tiles(captured, axes, channel, room, "a seam")).is_err()
     };
     let texels = (0..32 * 32).map(|i| [((i % 32) as f32 * 0.02).sin(), 0.0, 0.0, 1.0]).collect();
-    assert!(sees(&Captured { size: UVec3::new(32, 32, 1), texels }, 1, 0), "a ramp");
-    for (what, captured, channel) in resolved_channels(&baked(SEAMS)) {
+    assert!(sees(&Captured { size: UVec3::new(32, 32, 1), texels }, 1, 0, 1.02), "a ramp");
+    for (what, captured, channel, room) in resolved_channels(&baked(SEAMS)) {
         // Half a cell short of the whole.
         let cell = captured.size.z >> (channel + 1);
-        assert!(sees(&cut(&captured, captured.size.z - cell / 2), 3, channel), "{what}, channel {channel}");
+        assert!(sees(&cut(&captured, captured.size.z - cell / 2), 3, channel, room), "{what}, channel {channel}");
     }
 }
 
