@@ -132,7 +132,7 @@ fn what_comes_into_view_gets_twice_the_steps() {
             sum / count
         };
         let [before, inside, coming] =
-            [row(&rest, 4..28), row(&moving, 4..28), row(&moving, SIZE.x - 2..SIZE.x) / row(&rest, SIZE.x - 2..SIZE.x)];
+            [row(&rest, 4..28), row(&moving, 4..28), row(&moving, SIZE.x - 1..SIZE.x) / row(&rest, SIZE.x - 1..SIZE.x)];
         println!("{temporal:?}: {before:.1} steps at rest, {inside:.1} moving, {coming:.2} times as many coming in");
         assert!((inside / before - 1.0).abs() < 0.05, "{temporal:?}: {inside} steps moving, {before} at rest");
         assert!((1.8..2.2).contains(&coming), "{temporal:?}: {coming} times as many steps coming in");
