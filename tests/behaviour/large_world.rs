@@ -140,7 +140,9 @@ fn the_planet_of_an_atmosphere_shifts_with_the_origin() {
     // An error of the planet's place does show.
     world.stand(FAR + 20.0, 5000.0, Vec3::ZERO);
     let aside = rms(&before, &world.picture());
-    println!("{usual:.5} from frame to frame, {shifted:.5} over the shift, {anew:.5} anew; {aside:.5} where 20 m are lost");
+    println!(
+        "{usual:.5} from frame to frame, {shifted:.5} over the shift, {anew:.5} anew; {aside:.5} where 20 m are lost"
+    );
     assert!(shifted < 2.0 * usual + 2e-3, "{shifted} for {usual}");
     assert!(anew < 0.3 * aside, "{anew}, where 20 m of error make {aside}");
 }
