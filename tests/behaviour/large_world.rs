@@ -46,10 +46,11 @@ impl World {
         let world = self.app.world_mut();
         let offset = ground + shift.as_dvec3();
         world.resource_mut::<CloudModel>().world_offset = offset;
-        // The planet is one of the world's things.
-        let centre = (DVec3::NEG_Y * PLANET_RADIUS - offset).as_vec3();
-        for mut planet in world.query_filtered::<&mut Transform, With<Atmosphere>>().iter_mut(world) {
-            planet.translation = centre;
+        // The planet is one of the world's things, though Bevy gives it no transform.
+        let centre = Transform::from_translation((DVec3::NEG_Y * PLANET_RADIUS - offset).as_vec3());
+        let planets: Vec<Entity> = world.query_filtered::<Entity, With<Atmosphere>>().iter(world).collect();
+        for planet in planets {
+            world.entity_mut(planet).insert(centre);
         }
         world.resource_mut::<CloudClock>().seconds = seconds;
         let place = Transform::from_translation(up * 10.0 - shift).with_rotation(looking);
