@@ -179,10 +179,7 @@ fn update_field(
         let offset = good.model.world_offset;
         let planets: Vec<Planet> = planets
             .iter()
-            .map(|(atmosphere, at)| Planet {
-                centre: at.translation().as_dvec3() + offset,
-                radius: atmosphere.inner_radius.into(),
-            })
+            .map(|(atmosphere, at)| Planet::of_atmosphere(at.translation(), atmosphere.inner_radius, offset))
             .collect();
         // The renderer says what is wrong with one.
         let valid = zones.iter().filter(|(_, zone, _)| zone.validate().is_ok());

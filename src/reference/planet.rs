@@ -3,7 +3,7 @@
 //! Positions are in the camera's tangent frame: origin on the surface straight below the camera, y up, the camera at
 //! (0, `h0`, 0). Lengths in metres.
 
-use bevy::math::{DVec2, DVec3};
+use bevy::math::{DVec2, DVec3, Vec3};
 
 /// Radius of the planet where the scene's `Atmosphere` gives none (m).
 pub const PLANET_RADIUS: f64 = 6_360_000.0;
@@ -22,6 +22,17 @@ impl Default for Planet {
     /// Where the scene has no `Atmosphere`: [`PLANET_RADIUS`], with the world's origin on its surface where there is no offset.
     fn default() -> Self {
         Self { centre: DVec3::new(0.0, -PLANET_RADIUS, 0.0), radius: PLANET_RADIUS }
+    }
+}
+
+impl Planet {
+    /// That of an `Atmosphere` with its centre there in world space (m). Its entity is moved as all others are when the
+    /// origin shifts; but Bevy gives it no `Transform`, and where it is put by default nobody has moved it: then it stands
+    /// where it does without an offset.
+    pub(crate) fn of_atmosphere(at: Vec3, radius: f32, offset: DVec3) -> Self {
+        let unmoved = at == Vec3::NEG_Y * radius;
+        let offset = if unmoved { DVec3::ZERO } else { offset };
+        Self { centre: at.as_dvec3() + offset, radius: radius.into() }
     }
 }
 
@@ -90,6 +101,7 @@ pub fn map_position(p: DVec3, radius: f64) -> DVec2 {
 
 #[cfg(test)]
 mod tests {
+    use bevy::math::Mat4;
     use rand::{Rng, SeedableRng, rngs::StdRng};
 
     use super::*;
@@ -130,6 +142,22 @@ mod tests {
             }
         }
         assert!(inside > 10_000, "only {inside} points lay inside");
+    }
+
+    #[test]
+    fn a_shift_of_the_origin_leaves_the_planet_where_it_is() {
+        let (radius, offset) = (6_360_000.0, DVec3::new(65_536.0, -4096.0, 1024.0));
+        let at = |at: Vec3, offset| {
+            // As the renderer has it from Bevy.
+            let found = Mat4::from_translation(at).inverse().inverse().w_axis.truncate();
+            Planet::of_atmosphere(found, radius, offset)
+        };
+        let default = at(Vec3::NEG_Y * radius, DVec3::ZERO);
+        assert_eq!(default, Planet::default());
+        // Whether its entity is left where Bevy puts it, or moved along.
+        assert_eq!(at(Vec3::NEG_Y * radius, offset), default);
+        assert_eq!(at(Vec3::NEG_Y * radius - offset.as_vec3(), offset), default);
+        assert_eq!(at(Vec3::X * 9e6 - offset.as_vec3(), offset), at(Vec3::X * 9e6, DVec3::ZERO));
     }
 
     #[test]

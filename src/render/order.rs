@@ -29,6 +29,7 @@ use super::{
 };
 use crate::{
     model::decks,
+    reference::planet::Planet,
     settings::{CloudOrder, CloudSettings},
 };
 
@@ -72,7 +73,7 @@ impl Layer {
     /// The lowest deck: things above it are seen through it, and through thin cloud higher up as well.
     fn new(settings: &CloudSettings, atmosphere: Option<&ExtractedAtmosphere>) -> Self {
         let offset = settings.model.world_offset;
-        let (centre, radius) = planet(atmosphere, offset);
+        let Planet { centre, radius } = planet(atmosphere, offset);
         let decks = decks(&settings.model, settings.layers.shown().map(|(_, layer)| layer));
         let [bottom, top] = decks.first().copied().unwrap_or_default().to_array().map(f64::from);
         Self { centre: centre - offset, radius, bottom, top }

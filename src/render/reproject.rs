@@ -219,7 +219,8 @@ mod tests {
     fn every_texel_of_a_block_is_marched_in_turn() {
         for side in [1, 2, 4] {
             for start in [0, 5, 48] {
-                let mut seen: Vec<UVec2> = (start..start + side * side).map(|i| Sparse::new(side, i, UVec2::splat(9)).place).collect();
+                let mut seen: Vec<UVec2> =
+                    (start..start + side * side).map(|i| Sparse::new(side, i, UVec2::splat(9)).place).collect();
                 assert!(seen.iter().all(|place| place.max_element() < side));
                 seen.sort_by_key(|place| place.to_array());
                 seen.dedup();

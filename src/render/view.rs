@@ -30,7 +30,7 @@ use super::{
 use crate::{
     model::{MAX_ZONES, ModelSettings, ModelUniform, TangentFrame, TexelSizes, decks},
     phases::ReadyTables,
-    reference::planet::PLANET_RADIUS,
+    reference::planet::Planet,
     settings::{
         CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase, CloudQuality, CloudSettings,
         CloudView, CloudWeather, GoodPhases, GoodSettings, LightMix, Validate,
@@ -364,17 +364,12 @@ fn shown_settings(settings: &CloudSettings, debug: CloudDebugView) -> (CloudMode
     (model, settings.layers.clone(), lighting)
 }
 
-/// Centre (world space plus offset, m) and radius (m): those of the scene's atmosphere, whose entity is moved as all others
-/// are when the origin shifts, else a radius below where the world's origin is without an offset.
-pub(crate) fn planet(atmosphere: Option<&ExtractedAtmosphere>, offset: DVec3) -> (DVec3, f64) {
-    match atmosphere {
-        Some(a) => {
-            let centre = a.world_to_atmosphere.inverse().w_axis.truncate().as_dvec3();
-            (centre + offset, f64::from(a.inner_radius))
-        }
-        // Bevy's default planet.
-        None => (DVec3::new(0.0, -PLANET_RADIUS, 0.0), PLANET_RADIUS),
-    }
+/// The planet of the scene's atmosphere, else Bevy's default.
+pub(crate) fn planet(atmosphere: Option<&ExtractedAtmosphere>, offset: DVec3) -> Planet {
+    atmosphere.map_or_else(Planet::default, |a| {
+        let at = a.world_to_atmosphere.inverse().w_axis.truncate();
+        Planet::of_atmosphere(at, a.inner_radius, offset)
+    })
 }
 
 /// The tangent frame under a view.
@@ -384,7 +379,7 @@ fn space_below(
     settings: &CloudSettings,
 ) -> Option<TangentFrame> {
     let offset = settings.model.world_offset;
-    let (centre, radius) = planet(atmosphere, offset);
+    let Planet { centre, radius } = planet(atmosphere, offset);
     let camera = view.world_from_view.translation().as_dvec3() + offset;
     TangentFrame::below(camera, centre, radius)
 }

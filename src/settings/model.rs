@@ -91,8 +91,9 @@ pub struct CloudModel {
     #[reflect(@-1.0e12..=1.0e12_f32)]
     pub drift: DVec3,
     /// Position of the world's origin on the planet's map (m, f64): change it when a floating origin shifts, by as much as
-    /// all entities are moved back, the `Atmosphere`'s too. That one is 6360 km away, where transforms have steps of half a
-    /// metre: shift by whole metres, and clouds stay where they are. Default 0.
+    /// all entities are moved back. Move the `Atmosphere`'s along as well (Bevy gives it no `Transform`), or Bevy's sky does
+    /// not stay where it is; left at its default place, its planet still does for clouds. It is 6360 km away, where
+    /// transforms have steps of half a metre: shift by whole metres. Default 0.
     #[reflect(@-1.0e12..=1.0e12_f32)]
     pub world_offset: DVec3,
 }

@@ -180,13 +180,14 @@ fn pictures_of_a_few_texels_are_upscaled_too() {
             let (now, fronts) = (cloud_pixels(&app, &view), front(&app));
             for i in 0..whole.len() {
                 let (now, exact) = (now[i], whole[i]);
-                assert!(now.is_finite() && (now.w - exact.w).abs() < 0.3, "{size}, frame {k}: {now}, {exact} is right");
-                // It is told from the nearest texel that is marched, some degrees off.
-                let off = fronts[i] / begins[i] - 1.0;
-                assert!(off.abs() < 0.3, "{size}, frame {k}: from {} km, {} is right", fronts[i], begins[i]);
-                // Once every texel has been marched nothing is guessed any more.
-                let bright = now.truncate().distance(exact.truncate()) < 0.01 * exact.x;
-                let settled = bright && (now.w - exact.w).abs() < 0.004;
+                let there = now.x > 0.3 * exact.x && (now.w - exact.w).abs() < 0.45;
+                assert!(now.is_finite() && there, "{size}, frame {k}: {now}, {exact} is right");
+                // It is told from the nearest texel that is marched, up to two rows of 22° off.
+                let off = fronts[i] / begins[i];
+                assert!((0.4..2.5).contains(&off), "{size}, frame {k}: from {} km, {} is right", fronts[i], begins[i]);
+                // Once every texel has been marched a guess counts for a twentieth of that sample.
+                let bright = now.truncate().distance(exact.truncate()) < 0.05 * exact.length();
+                let settled = bright && (now.w - exact.w).abs() < 0.02;
                 assert!(k < 16 || settled, "{size}, frame {k}: {now}, {exact} is right");
             }
         }

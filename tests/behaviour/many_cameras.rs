@@ -120,8 +120,7 @@ fn a_view_that_cannot_be_drawn_costs_the_others_no_history() {
         run_updates(app, 12);
         cloud_pixels(app, &view)
     };
-    let apart =
-        |a: &[Vec4], b: &[Vec4]| a.iter().zip(b).map(|(a, b)| (a.w - b.w).abs()).sum::<f32>() / a.len() as f32;
+    let apart = |a: &[Vec4], b: &[Vec4]| a.iter().zip(b).map(|(a, b)| (a.w - b.w).abs()).sum::<f32>() / a.len() as f32;
     let alone = filled(&mut app, TemporalMode::SlidingWindow);
     let single = filled(&mut app, TemporalMode::Off);
     let noise = apart(&single, &alone);

@@ -153,8 +153,8 @@ fn in_motion_a_picture_is_nearly_as_good_as_at_rest() {
 fn layers_are_taken_along_with_their_own_wind() {
     const FRAMES: u32 = 12;
     let (mut app, view, sun) = sky();
-    // Seconds a frame, and field of view: shapes go some three texels within the window, upwards in the picture.
-    for (name, seconds, fov) in [("Cumulus", 1.0, 0.4), ("Cirrus", 1.0, 0.4)] {
+    // Seconds a frame, in which shapes go by about a texel.
+    for (name, seconds) in [("Cumulus", 2.0), ("Cirrus", 3.0)] {
         let mut preset = CloudPreset::named(name).expect("a built-in preset");
         for layer in &mut preset.layers.0 {
             // Whatever is not followed stays as it is.
@@ -166,13 +166,17 @@ fn layers_are_taken_along_with_their_own_wind() {
         // The hidden layer's wind is nobody's.
         preset.model.wind = Vec3::ZERO;
         preset.apply(app.world_mut());
-        let narrow = PerspectiveProjection { fov, ..default() };
+        let narrow = PerspectiveProjection { fov: 0.4, ..default() };
         app.world_mut().entity_mut(view.camera).insert(Projection::Perspective(narrow));
         run_updates(&mut app, 2);
         until_drawn(&mut app);
         let motion = Motion { pitch: 0.8, seconds, ..REST };
+        // The middle of a window of eight: what it shows if nothing is followed is about as far off.
+        pose(&mut app, &view, sun, motion, FRAMES - 5);
+        let earlier = truth(&mut app, &view, MarchResolution::Full);
         pose(&mut app, &view, sun, motion, FRAMES - 1);
         let truth = truth(&mut app, &view, MarchResolution::Full);
+        let behind = rms(&earlier, &truth);
         for mode in HELD {
             app.insert_resource(quality(mode));
             start_over(&mut app, &view);
@@ -184,8 +188,9 @@ fn layers_are_taken_along_with_their_own_wind() {
                 run_updates(&mut app, 1);
             }
             let moving = rms(&picture(&app, &view), &truth);
-            println!("{name} {mode:?}: {rest:.4} at rest, {moving:.4} in motion");
-            assert!(moving < 1.5 * rest, "{name} {mode:?}: {moving} in motion, {rest} at rest");
+            println!("{name} {mode:?}: {rest:.4} at rest, {moving:.4} in motion, {behind:.4} left behind");
+            let most = rest + 0.4 * behind;
+            assert!(moving < most, "{name} {mode:?}: {moving} in motion, {rest} at rest, {behind} left behind");
         }
     }
 }

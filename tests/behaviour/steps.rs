@@ -58,7 +58,7 @@ fn a_ray_that_runs_out_of_steps_still_reaches_its_end() {
                 assert!(passes, "{height} m, {degrees}°, {most} steps: {} comes through, not {right}", coarse.w);
                 // Coarse steps see shade where they stand: not dark for that.
                 let ratio = coarse.x / fine.x;
-                assert!(most < 24 || (0.8..1.25).contains(&ratio), "{degrees}°, {most} steps: {ratio} as bright");
+                assert!(most < 24 || (0.95..1.05).contains(&ratio), "{degrees}°, {most} steps: {ratio} as bright");
             }
         }
     }
@@ -132,7 +132,7 @@ fn what_comes_into_view_gets_twice_the_steps() {
             sum / count
         };
         let [before, inside, coming] =
-            [row(&rest, 4..28), row(&moving, 4..28), row(&moving, SIZE.x - 2..SIZE.x) / row(&rest, SIZE.x - 2..SIZE.x)];
+            [row(&rest, 4..28), row(&moving, 4..28), row(&moving, SIZE.x - 1..SIZE.x) / row(&rest, SIZE.x - 1..SIZE.x)];
         println!("{temporal:?}: {before:.1} steps at rest, {inside:.1} moving, {coming:.2} times as many coming in");
         assert!((inside / before - 1.0).abs() < 0.05, "{temporal:?}: {inside} steps moving, {before} at rest");
         assert!((1.8..2.2).contains(&coming), "{temporal:?}: {coming} times as many steps coming in");
@@ -152,7 +152,7 @@ fn edges_that_jitter_get_no_more_steps() {
     let camera = *counted.app.world().get::<Transform>(counted.view.camera).expect("a camera");
     let board = camera * Transform::from_xyz(0.0, 0.0, -200.0).with_rotation(Quat::from_rotation_z(0.7));
     spawn_box(&mut counted.app, Vec3::new(60.0, 500.0, 0.1), board, Vec3::ONE);
-    let (mut flips, mut before) = (0, open.clone());
+    let (mut flips, mut doubled, mut before) = (0, 0, open.clone());
     for k in 0..24 {
         // As TAA has it, half a pixel either way.
         let (x, y) = ([-0.45, 0.45][k % 2], [-0.45, 0.45][k / 2 % 2]);
@@ -161,12 +161,12 @@ fn edges_that_jitter_get_no_more_steps() {
         let now = counted.steps();
         if k >= 12 {
             flips += now.iter().zip(&before).filter(|(now, before)| (**now > 0.0) != (**before > 0.0)).count();
-            for (i, (now, open)) in now.iter().zip(&open).enumerate() {
-                assert!(*now < 1.3 * open, "texel {i} takes {now} steps, {open} without the board");
-            }
+            doubled += now.iter().zip(&open).filter(|(now, open)| **now > 1.5 * **open).count();
         }
         before = now;
     }
-    println!("{flips} texels were covered or uncovered");
+    println!("{flips} texels were covered or uncovered, {doubled} took twice the steps");
     assert!(flips > 50, "only {flips} texels were covered or uncovered, so nothing is tested");
+    // Where the picture ends there may be no neighbour that saw as far.
+    assert!(doubled * 20 < flips, "{doubled} of {flips} texels took twice the steps");
 }
