@@ -50,8 +50,8 @@ pub(crate) struct FrameUniform {
     phase_params: [Vec4; PHASE_SLOTS],
     phase_kinds: UVec4,
     phase_fall: Vec4,
-    first_thinning: Vec4,
-    first_eccentricity: Vec4,
+    peak_share: Vec4,
+    peak_asymmetry: Vec4,
     octave_factors: Vec4,
     diffusion: Vec4,
     ambient: Vec4,
@@ -87,7 +87,7 @@ impl FrameUniform {
         let local_from_world = space.local_from_world.as_quat();
         let size = marched_size(*viewport, quality);
         let reach = reach(quality, lighting, space).max(input.highest_horizon);
-        let [first_thinning, first_eccentricity] = phases.first_octave(lighting);
+        let [peak_share, peak_asymmetry] = phases.peaks(lighting);
         let held = if quality.is_path_traced() { window.index + 1 } else { window.held_after() };
         Self {
             view_from_clip: input.clip_from_view.inverse(),
@@ -97,8 +97,8 @@ impl FrameUniform {
             phase_params: phases.params(),
             phase_kinds: phases.kinds(),
             phase_fall: phases.fall(),
-            first_thinning,
-            first_eccentricity,
+            peak_share,
+            peak_asymmetry,
             octave_factors: Vec4::new(
                 lighting.attenuation,
                 lighting.contribution,
