@@ -219,7 +219,7 @@ fn put(app: &mut App, layers: &[CloudLayer]) {
     settle(app);
 }
 
-/// Steps that the picture of [`CloudDebugView::Steps`] tells of, of 512 at most.
+/// Steps that the picture of [`CloudDebugView::Steps`] tells of.
 fn steps(app: &mut App, view: &View) -> Vec<f32> {
     app.world_mut().get_mut::<CloudView>(view.camera).expect("it shows clouds").debug = CloudDebugView::Steps;
     run_updates(app, 1);
