@@ -209,6 +209,14 @@ impl Phase {
         }
     }
 
+    /// Mean cosine of that peak's light: 0 where there is none.
+    pub fn peak_asymmetry(&self) -> f64 {
+        match self {
+            Self::HgDraine(droplets) => droplets.g_hg,
+            _ => 0.0,
+        }
+    }
+
     /// `kind` and `params` of the shader's `phase()`.
     pub fn shader_parameters(&self) -> (u32, [f32; 4]) {
         let (kind, params) = match *self {

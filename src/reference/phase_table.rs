@@ -55,16 +55,13 @@ impl PhaseTable {
 
     /// Mean cosine ⟨cosθ⟩ of the scattering angle, by colour.
     pub fn mean_cosine(&self) -> DVec3 {
-        let half = |values: &[DVec3]| -> DVec3 {
-            let cells = (0..HALF).map(|i| {
-                let (a, b) = (1.0 - node(i), 1.0 - node(i + 1));
-                // Simpson's rule, exact for the product of two lines.
-                let middle = (values[i] + values[i + 1]) * (a + b);
-                (a - b) / 6.0 * (values[i] * a + middle + values[i + 1] * b)
-            });
-            cells.sum()
-        };
-        2.0 * PI * (half(&self.front) - half(&self.back))
+        2.0 * PI * (cosine_integral(&self.front) - cosine_integral(&self.back))
+    }
+
+    /// Mean cosine of the light in the narrow forward peak, all colours together: 0 where there is none.
+    pub fn narrow_mean_cosine(&self) -> f64 {
+        let share = self.narrow_share().element_sum();
+        if share > 0.0 { 2.0 * PI * cosine_integral(&self.narrow()).element_sum() / share } else { 0.0 }
     }
 
     /// Share of the light in the narrow forward peak, by colour: what lies above the value at 6°.
@@ -126,4 +123,15 @@ fn cell(values: &[DVec3], i: usize) -> DVec3 {
 /// Integral over 1 − |cosθ| up to a node.
 fn integral(values: &[DVec3], to: usize) -> DVec3 {
     (0..to).map(|i| cell(values, i)).sum()
+}
+
+/// Integral of a half's values times |cosθ|.
+fn cosine_integral(values: &[DVec3]) -> DVec3 {
+    let cells = (0..HALF).map(|i| {
+        let (a, b) = (1.0 - node(i), 1.0 - node(i + 1));
+        // Simpson's rule, exact for the product of two lines.
+        let middle = (values[i] + values[i + 1]) * (a + b);
+        (a - b) / 6.0 * (values[i] * a + middle + values[i + 1] * b)
+    });
+    cells.sum()
 }

@@ -53,8 +53,8 @@ pub(crate) struct FrameUniform {
     phase_kinds: UVec4,
     phase_fall: Vec4,
     phase_shift: Vec4,
-    first_thinning: Vec4,
-    first_eccentricity: Vec4,
+    peak_share: Vec4,
+    peak_asymmetry: Vec4,
     octave_factors: Vec4,
     diffusion: Vec4,
     ambient: Vec4,
@@ -95,7 +95,7 @@ impl FrameUniform {
         let local_from_world = space.local_from_world.as_quat();
         let size = marched_size(*viewport, quality);
         let reach = reach(quality, lighting, space);
-        let [first_thinning, first_eccentricity] = phases.first_octave(lighting, input.octaves);
+        let [peak_share, peak_asymmetry] = phases.peaks(lighting, input.octaves);
         let held = if quality.is_path_traced() { window.index + 1 } else { window.held_after() };
         Self {
             view_from_clip: input.clip_from_view.inverse(),
@@ -106,8 +106,8 @@ impl FrameUniform {
             phase_kinds: phases.kinds(),
             phase_fall: phases.fall(),
             phase_shift: phases.shift(),
-            first_thinning,
-            first_eccentricity,
+            peak_share,
+            peak_asymmetry,
             octave_factors: Vec4::new(
                 lighting.attenuation,
                 lighting.contribution,

@@ -48,6 +48,8 @@ impl Plugin for CloudRenderPlugin {
         load_shader_library!(app, "march/phase.wesl");
         load_shader_library!(app, "march/table.wesl");
         load_shader_library!(app, "march/integrate.wesl");
+        load_shader_library!(app, "march/sources.wesl");
+        load_shader_library!(app, "march/shade.wesl");
         load_shader_library!(app, "march/lighting.wesl");
         load_shader_library!(app, "march/aerial.wesl");
         load_shader_library!(app, "march/debug.wesl");

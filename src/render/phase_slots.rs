@@ -56,6 +56,10 @@ impl Slot {
     fn peak_share(&self) -> f64 {
         self.table.as_ref().map_or_else(|| self.phase.peak_share(), |table| table.narrow_share().element_sum() / 3.0)
     }
+
+    fn peak_asymmetry(&self) -> f64 {
+        self.table.as_ref().map_or_else(|| self.phase.peak_asymmetry(), |table| table.narrow_mean_cosine())
+    }
 }
 
 /// The phase functions of a view.
@@ -115,13 +119,14 @@ impl PhaseSlots {
         self.each(0.0, |slot| 0.75 * (1.0 - slot.mean_cosine() as f32)).into()
     }
 
-    /// Factors on optical depth and asymmetry of the first octave, each by slot.
+    /// The narrow forward peak, by slot: its share of the light, and its asymmetry.
     ///
-    /// Light in the diffraction peak hardly turns: it reaches deeper, and leaves a little wider. Both shares are fitted
-    /// to the path tracer. Single scattering alone (one octave), or the octaves alone (no diffusion), are the thesis's.
-    pub fn first_octave(&self, lighting: &CloudLighting, octaves: f32) -> [Vec4; 2] {
-        let peaks = diffuses(lighting, octaves) * Vec4::from(self.each(0.0, |slot| slot.peak_share() as f32));
-        [Vec4::ONE - 0.6 * peaks, Vec4::ONE - 0.02 * peaks]
+    /// Light in a diffraction peak hardly turns, so it is followed apart: it goes on as if nothing had been in its way, a
+    /// little wider each time. Single scattering alone (one octave), or the octaves alone (no diffusion), are the
+    /// thesis's, which knows of no peak: then all shares are 0.
+    pub fn peaks(&self, lighting: &CloudLighting, octaves: f32) -> [Vec4; 2] {
+        let share = Vec4::from(self.each(0.0, |slot| slot.peak_share() as f32));
+        [diffuses(lighting, octaves) * share, self.each(0.0, |slot| slot.peak_asymmetry() as f32).into()]
     }
 }
 

@@ -14,19 +14,19 @@ use super::PhaseFunction;
 pub struct CloudLighting {
     /// Terms N of the multiple-scattering sum (thesis, 3.8): 1 is single scattering, 0 no sunlight. Each costs
     /// one exponential a sample. With `diffusion` each but the first holds only what the one before it has lost on the
-    /// way: in thin cloud nothing is scattered twice. Default 3.
+    /// way: in thin cloud nothing is scattered twice. Default 6.
     #[reflect(@0..=16_u32)]
     pub octaves: u32,
-    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.4,
-    /// fitted to the path tracer.
+    /// a: factor on the optical depth from one octave to the next (thesis, 3.9). Default 0.69,
+    /// so that the last of six octaves reaches as deep as the path tracer says.
     #[reflect(@0.0..=1.0_f32)]
     pub attenuation: f32,
     /// b: factor on the contribution from one octave to the next. Energy is bounded with `diffusion`, and without it
     /// where this is at most `attenuation`. Default 1, fitted.
     #[reflect(@0.0..=1.0_f32)]
     pub contribution: f32,
-    /// c: factor on the phase function's asymmetry from one octave to the next (Wrenninge). Default 0.6,
-    /// fitted.
+    /// c: factor on the phase function's asymmetry from one octave to the next (Wrenninge). With
+    /// `diffusion` a narrow forward peak is followed apart, and this is the rest's. Default 0.65, fitted.
     #[reflect(@0.0..=1.0_f32)]
     pub eccentricity: f32,
     /// Strength of the sun's light that has been scattered so often that it diffuses, which the octaves lose (with two
@@ -35,7 +35,8 @@ pub struct CloudLighting {
     /// Default 5.5, fitted to the path tracer.
     #[reflect(@0.0..=40.0_f32)]
     pub diffusion: f32,
-    /// Asymmetry of that light: how much of it goes on away from the sun (0 all ways alike). Default 0.15, fitted.
+    /// Asymmetry of that light at its source: how much of it goes on away from the sun (0 all ways alike). That it is
+    /// brighter from where it comes from is part of it in any case. Default 0, fitted.
     #[reflect(@0.0..=0.9_f32)]
     pub diffusion_asymmetry: f32,
     /// The phase function of layers that have none of their own. Default [`PhaseFunction::HgDraine`].
@@ -97,12 +98,12 @@ pub struct CloudLighting {
 impl Default for CloudLighting {
     fn default() -> Self {
         Self {
-            octaves: 3,
-            attenuation: 0.4,
+            octaves: 6,
+            attenuation: 0.69,
             contribution: 1.0,
-            eccentricity: 0.6,
+            eccentricity: 0.65,
             diffusion: 5.5,
-            diffusion_asymmetry: 0.15,
+            diffusion_asymmetry: 0.0,
             phase: PhaseFunction::HgDraine,
             g: 0.8,
             g_back: -0.3,

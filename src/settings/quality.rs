@@ -122,19 +122,23 @@ pub struct CloudQuality {
     #[reflect(@1..=64_u32)]
     pub empty_steps: u32,
     /// Steps a ray may take, long and small together: once it has taken half of them, they grow so that the rest reaches to
-    /// its end. Default 512.
+    /// its end. Default 768.
     #[reflect(@1..=8192_u32)]
     pub max_steps: u32,
-    /// Samples towards the sun for each lit sample (0: the sun is never shadowed). Cost is linear in it. Default 6.
+    /// Samples towards the sun for each lit sample (0: the sun is never shadowed). Cost is linear in it. They shrink to fit
+    /// the way through the clouds where it is shorter; where it is longer, as under a low sun, one more is taken for each
+    /// 1.2 km, up to 30 km.
+    /// Default 6.
     #[reflect(@0..=64_u32)]
     pub light_steps: u32,
     /// Length of the first step towards the sun (m). Default 45.
     #[reflect(@0.5..=5000.0_f32)]
     pub light_step: f32,
-    /// Factor from one step towards the sun to the next: 1 is uniform. Default 1.7.
+    /// Factor from one step towards the sun to the next: 1 is uniform. Default 1.9.
     #[reflect(@1.0..=4.0_f32)]
     pub light_growth: f32,
-    /// The march stops where transmittance falls to this (thesis: 0.075). Default 0.01.
+    /// The march stops where transmittance falls to this (thesis: 0.075); what lies behind is only guessed at, for the sky
+    /// that shines through. Default 0.01.
     #[reflect(@0.0..=0.9_f32)]
     pub transmittance_stop: f32,
     /// Samples whose density is below this are skipped (thesis: 0.01). Default 0.002.
@@ -143,7 +147,7 @@ pub struct CloudQuality {
     /// Cut-off distance (m): nothing is marched beyond but high layers (bases from 2500 m on, and some from 2000 m), which
     /// are seen until they pass below the horizon, at 180 km and more. From 2 km up it grows with altitude, so that from
     /// 12 km clouds reach past the horizon, and from space (60 km) all do to the planet's rim; steps grow with distance, so
-    /// that costs some dozens of them. Default 90 000.
+    /// that costs some dozens of them. Default 150 000.
     #[reflect(@100.0..=2_000_000.0_f32)]
     pub max_distance: f32,
     /// Added to the mip level of all noise: above 0 is smoother and cheaper. Default 0.
@@ -177,36 +181,24 @@ impl Default for CloudQuality {
 }
 
 impl CloudQuality {
-    /// For weak GPUs: a quarter of the resolution, long steps, 50 km.
+    /// For weak GPUs: a quarter of the resolution, long steps, 90 km.
     pub fn low() -> Self {
         Self {
             resolution: MarchResolution::Quarter,
             step: 140.0,
             step_growth: 0.014,
-            long_step: 4,
-            max_steps: 256,
-            light_steps: 4,
-            light_step: 60.0,
-            light_growth: 2.2,
-            max_distance: 50_000.0,
+            max_steps: 512,
+            max_distance: 90_000.0,
             ..Self::high()
         }
     }
 
     /// Between [`low`](Self::low) and [`high`](Self::high).
     pub fn medium() -> Self {
-        Self {
-            step: 120.0,
-            step_growth: 0.012,
-            max_steps: 384,
-            light_steps: 5,
-            light_growth: 2.0,
-            max_distance: 70_000.0,
-            ..Self::high()
-        }
+        Self { step: 140.0, step_growth: 0.014, max_steps: 512, max_distance: 120_000.0, ..Self::high() }
     }
 
-    /// The default: half resolution, 8 frames, 90 km.
+    /// The default: half resolution, 8 frames, 150 km.
     pub fn high() -> Self {
         Self {
             method: CloudMethod::March,
@@ -215,13 +207,13 @@ impl CloudQuality {
             step_growth: 0.008,
             long_step: 4,
             empty_steps: 6,
-            max_steps: 512,
+            max_steps: 768,
             light_steps: 6,
             light_step: 45.0,
-            light_growth: 1.7,
+            light_growth: 1.9,
             transmittance_stop: 0.01,
             density_skip: 0.002,
-            max_distance: 90_000.0,
+            max_distance: 150_000.0,
             lod_bias: 0.0,
             integration: Integration::EnergyConserving,
             offsets: true,
@@ -237,15 +229,14 @@ impl CloudQuality {
     pub fn ultra() -> Self {
         Self {
             resolution: MarchResolution::Full,
-            step: 40.0,
-            step_growth: 0.004,
+            step: 60.0,
+            step_growth: 0.006,
             max_steps: 2048,
-            light_steps: 12,
-            light_step: 25.0,
-            light_growth: 1.35,
+            light_steps: 16,
+            light_step: 20.0,
+            light_growth: 1.3,
             transmittance_stop: 0.005,
             density_skip: 0.001,
-            max_distance: 150_000.0,
             window: 16,
             ..Self::high()
         }

@@ -146,6 +146,9 @@ fn ice_has_the_asymmetry_of_cirrus_and_its_halo_where_it_belongs() {
         let g = table.mean_cosine();
         assert!(g.min_element() > 0.75 && g.max_element() < 0.8, "halo {halo}: asymmetry {g}");
         assert!((table.narrow_share() - 0.5).abs().max_element() < 0.1, "{}", table.narrow_share());
+        // All of the peak lies within 6 degrees, and most of it within 2.
+        let narrow = table.narrow_mean_cosine();
+        assert!((degrees(4.0)..1.0).contains(&narrow), "{narrow}");
         let ring = table.value(degrees(23.0)) / table.value(degrees(20.5));
         if halo == 0.0 {
             assert!(ring.max_element() < 1.0, "rough crystals have a halo: {ring}");

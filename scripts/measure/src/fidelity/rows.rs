@@ -46,9 +46,10 @@ const PRESETS: [(&str, &str); 4] = [("low", "Low"), ("medium", "Medium"), (HIGH,
 type Change = (&'static str, &'static str, &'static [&'static str]);
 
 /// The approximations, each alone.
-const ALONE: [Change; 26] = [
+const ALONE: [Change; 27] = [
     ("octaves_1", "1 octave: single scattering", &["lighting.octaves=1"]),
     ("octaves_2", "2 octaves", &["lighting.octaves=2"]),
+    ("octaves_3", "3 octaves", &["lighting.octaves=3"]),
     ("octaves_4", "4 octaves", &["lighting.octaves=4"]),
     ("octaves_8", "8 octaves", &["lighting.octaves=8"]),
     ("diffusion_off", "no diffusion term", &["lighting.diffusion=0"]),
@@ -56,12 +57,12 @@ const ALONE: [Change; 26] = [
     ("phase_cut_100", "phase cut at 100", &["lighting.phase_limit=100"]),
     ("phase_cut_none", "phase not cut", &["lighting.phase_limit=100000"]),
     ("ambient_off", "no ambient light", &["lighting.ambient_strength=0"]),
-    ("light_4", "4 light steps (Low's)", &LIGHT_LOW),
-    ("light_6", "6 light steps (High's)", &LIGHT_HIGH),
-    ("light_12", "12 light steps (Ultra's)", &LIGHT_ULTRA),
+    ("light_4", "4 light steps", &LIGHT_FEW),
+    ("light_6", "6 light steps (Low's to High's)", &LIGHT_HIGH),
+    ("light_16", "16 light steps (Ultra's)", &LIGHT_ULTRA),
     ("step_140", "step 140 m (Low's)", &["quality.step=140", "quality.step_growth=0.014"]),
     ("step_90", "step 90 m (High's)", &["quality.step=90", "quality.step_growth=0.008"]),
-    ("step_40", "step 40 m (Ultra's)", &["quality.step=40", "quality.step_growth=0.004"]),
+    ("step_60", "step 60 m (Ultra's)", &["quality.step=60", "quality.step_growth=0.006"]),
     ("half", "half resolution", &["quality.resolution=half"]),
     ("quarter", "quarter resolution", &["quality.resolution=quarter"]),
     ("window_1", "1 frame", &["quality.temporal=off"]),
@@ -71,19 +72,25 @@ const ALONE: [Change; 26] = [
     ("skip_high", "skip density below .002 (High's)", &["quality.density_skip=0.002"]),
     ("skip_thesis", "skip density below .01 (thesis)", &["quality.density_skip=0.01"]),
     ("lod_0", "noise filtered as by all presets", &["quality.lod_bias=0"]),
-    ("distance_90", "90 km (High's)", &["quality.max_distance=90000"]),
-    ("distance_50", "50 km (Low's)", &["quality.max_distance=50000"]),
+    ("distance_90", "90 km (Low's)", &["quality.max_distance=90000"]),
+    ("distance_50", "50 km", &["quality.max_distance=50000"]),
 ];
-const LIGHT_LOW: [&str; 3] = ["quality.light_steps=4", "quality.light_step=60", "quality.light_growth=2.2"];
-const LIGHT_HIGH: [&str; 3] = ["quality.light_steps=6", "quality.light_step=45", "quality.light_growth=1.7"];
-const LIGHT_ULTRA: [&str; 3] = ["quality.light_steps=12", "quality.light_step=25", "quality.light_growth=1.35"];
+const LIGHT_FEW: [&str; 3] = ["quality.light_steps=4", "quality.light_step=60", "quality.light_growth=2.2"];
+const LIGHT_HIGH: [&str; 3] = ["quality.light_steps=6", "quality.light_step=45", "quality.light_growth=1.9"];
+const LIGHT_ULTRA: [&str; 3] = ["quality.light_steps=16", "quality.light_step=20", "quality.light_growth=1.3"];
+
+const UPSCALE: [&str; 3] = ["quality.resolution=full", "quality.temporal=upscale", "quality.block=two"];
 
 /// Changes of the default preset: there a window does more than where steps are short.
-const FROM_HIGH: [Change; 4] = [
+const FROM_HIGH: [Change; 8] = [
     ("high_window_1", "High, 1 frame", &["quality.temporal=off"]),
     ("high_window_16", "High, 16 frames", &["quality.window=16"]),
     ("high_full", "High, full resolution", &["quality.resolution=full"]),
     ("high_quarter", "High, quarter resolution", &["quality.resolution=quarter"]),
+    ("high_upscale", "High, full resolution, a quarter of it a frame", &UPSCALE),
+    ("high_step_60", "High, step 60 m", &["quality.step=60", "quality.step_growth=0.006"]),
+    ("high_light_16", "High, 16 light steps", &LIGHT_ULTRA),
+    ("high_90", "High, 90 km", &["quality.max_distance=90000"]),
 ];
 
 /// All rows, in the order of the report.
@@ -139,6 +146,6 @@ mod tests {
     #[test]
     fn a_part_still_has_what_it_is_measured_by() {
         let names: Vec<_> = chosen(&["octaves".to_owned()]).iter().map(|row| row.name).collect();
-        assert_eq!(names, [HIGH, CONVERGED, "octaves_1", "octaves_2", "octaves_4", "octaves_8"]);
+        assert_eq!(names, [HIGH, CONVERGED, "octaves_1", "octaves_2", "octaves_3", "octaves_4", "octaves_8"]);
     }
 }
