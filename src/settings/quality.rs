@@ -70,7 +70,7 @@ pub enum UpscaleBlock {
     /// 2×2: a quarter is marched; the default.
     #[default]
     Two,
-    /// 4×4: a sixteenth is marched.
+    /// 4×4: a sixteenth is marched. What a moving object uncovers is right after 16 frames, not after 4 as elsewhere.
     Four,
 }
 
