@@ -24,7 +24,8 @@ const SWING: f64 = 0.7;
 /// clouds: 0 at first, so that the map is whole, and after a repeat another at any place of it. A difference of sines is one
 /// cosine.
 pub(super) fn places(at: DVec2, gone: DVec2, scale: f64) -> (Vec4, Vec4, DVec2) {
-    let repeats = gone.length() / scale;
+    // Unlike `length`, which squares, this holds for any time that is a number.
+    let repeats = (gone.x / scale).hypot(gone.y / scale);
     let half = 0.5 * TURNS * repeats;
     let phase = |k: usize| (WAVES[k].dot(at) / scale + half[k]).rem_euclid(TAU) as f32;
     let amplitude = |k: usize| (2.0 * SWING * half[k].rem_euclid(TAU).sin()) as f32;

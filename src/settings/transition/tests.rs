@@ -128,7 +128,7 @@ fn walk(name: &str, at: impl Fn(f64) -> Sky, [from, to]: [f64; 2]) {
             };
             // Two of one name may differ in what they are made of alone.
             let partner = (0..left.len()).find(|i| same(&left[*i]) && jump(left[*i], now, [earlier, t]).is_none());
-            match partner.or((0..left.len()).find(|i| same(&left[*i]))) {
+            match partner.or_else(|| (0..left.len()).find(|i| !is_gone(now) && same(&left[*i]))) {
                 Some(i) => assert_eq!(jump(left.remove(i), now, [earlier, t]), None, "{name} at {}", t - BEGIN),
                 None => assert!(is_gone(now), "{name}: {} is there at once at {}: {now:?}", now.name, t - BEGIN),
             }
