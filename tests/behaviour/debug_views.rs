@@ -110,8 +110,8 @@ fn values_of_a_slab_are_its_own() {
     let mean = 1000.0 + 1.0 / extinction - thickness * through / (1.0 - through);
     let depth = middle(CloudDebugView::CloudDepth) * CloudQuality::default().max_distance;
     assert!((depth - Vec3::splat(mean)).abs().max_element() < 40.0, "{depth} m, {mean} m is right");
-    // 40 small steps and 10 long ones; red is half up the logarithm of the most, yellow three quarters.
-    let share = f32::log2(51.0) / f32::log2(1.0 + CloudQuality::default().max_steps as f32);
+    // 40 small steps, after a long one that found cloud; red is half up the logarithm of the most, yellow three quarters.
+    let share = f32::log2(42.0) / f32::log2(1.0 + CloudQuality::default().max_steps as f32);
     let steps = middle(CloudDebugView::Steps);
     let t = 4.0 * share;
     let right = Vec3::new(t - 1.0, t - 2.0, (1.0 - (t - 1.0).abs()).max(t - 3.0)).clamp(Vec3::ZERO, Vec3::ONE);

@@ -78,19 +78,23 @@ fn rms(a: &[Vec4], b: &[Vec4]) -> f32 {
 }
 
 #[test]
-fn ten_thousand_km_away_after_139_hours_of_wind_the_sky_is_the_same() {
+fn ten_thousand_km_away_after_139_hours_of_wind_no_metre_is_lost() {
     const FAR: f64 = 1e7;
+    const LATE: f64 = FAR / WIND as f64;
     let mut world = world(TemporalMode::SlidingWindow);
-    world.stand(0.0, 0.0, Vec3::ZERO);
+    world.stand(FAR, LATE, Vec3::ZERO);
     let here = world.picture();
-    // What the wind has carried there in the meantime is what was here; nothing of it is lost to rounding.
-    world.stand(FAR, FAR / f64::from(WIND), Vec3::ZERO);
-    let there = world.picture();
-    let off = rms(&here, &there);
+    // Who goes with the wind sees the same sky. In f32 place and wind would go by steps of a metre there.
+    let mut off = 0.0_f32;
+    for seconds in [0.118, 0.231, 0.377] {
+        world.stand(FAR + f64::from(WIND) * seconds, LATE + seconds, Vec3::ZERO);
+        off = off.max(rms(&here, &world.picture()));
+    }
     // An error does show.
-    world.stand(FAR + 20.0, FAR / f64::from(WIND), Vec3::ZERO);
+    world.stand(FAR + 20.0, LATE, Vec3::ZERO);
     let aside = rms(&here, &world.picture());
     println!("{off:.5} apart; {aside:.5} where 20 m are lost");
+    // A little changes in truth: which places of the map are read goes with the wind, too.
     assert!(off < 0.1 * aside, "{off} apart, where 20 m of error make {aside}");
 }
 
@@ -136,14 +140,19 @@ fn the_planet_of_an_atmosphere_shifts_with_the_origin() {
     world.stand(FAR, 5000.0, Vec3::new(65_536.0, -4096.0, -131_072.0));
     run_updates(&mut world.app, 1);
     let shifted = rms(&before, &world.now());
+    world.app.world_mut().get_mut::<CloudView>(world.view.camera).unwrap().reset += 1;
+    run_updates(&mut world.app, 1);
+    let restarted = rms(&before, &world.now());
     // And none of it is held from before.
     let anew = rms(&before, &world.picture());
     // An error of the planet's place does show.
     world.stand(FAR + 20.0, 5000.0, Vec3::ZERO);
     let aside = rms(&before, &world.picture());
     println!(
-        "{usual:.5} from frame to frame, {shifted:.5} over the shift, {anew:.5} anew; {aside:.5} where 20 m are lost"
+        "{usual:.5} from frame to frame, {shifted:.5} over the shift, {restarted:.5} if all is lost, {anew:.5} anew; \
+         {aside:.5} where 20 m are lost"
     );
-    assert!(shifted < 2.0 * usual + 2e-3, "{shifted} for {usual}");
+    // The planet's transform rounds to half a metre, so held frames are reprojected by that. None is dropped.
+    assert!(usual < 2e-3 && shifted < 0.2 * restarted, "{shifted} for {usual}, {restarted} if all is lost");
     assert!(anew < 0.3 * aside, "{anew}, where 20 m of error make {aside}");
 }
