@@ -319,7 +319,7 @@ fn how_far_a_layer_is_seen_is_its_own_affair() {
     let low = CloudLayer { map: map(5.0), ..cumulus() };
     let high = CloudLayer { map: map(8.0), coverage: 1.0, extinction: 0.01, ..cirrus() };
     let hidden = CloudLayer { coverage: -1.0, ..high.clone() };
-    let (mut app, view) = far_away(&[low.clone()]);
+    let (mut app, view) = far_away(std::slice::from_ref(&low));
     let alone = cloud_pixels(&app, &view);
     assert!(alone.iter().any(|p| p.w < 0.9) && alone.iter().any(|p| p.w == 1.0), "there is cloud and sky: {alone:?}");
     put(&mut app, &[low.clone(), hidden]);

@@ -17,8 +17,8 @@ use bevy_cumulus::{
 use crate::{
     gpu::run_updates,
     halves::{from_half, worst_relative},
-    slab::{directions_through, exact_march, full_radiance, length_in_slab, looking, slab_app},
     modes::{HELD, Mode, in_mode},
+    slab::{directions_through, exact_march, full_radiance, length_in_slab, looking, slab_app},
     view::{Sky, View, cloud_pixels, clouds_app, read_image, spawn_sun, spawn_view, until_drawn},
 };
 
