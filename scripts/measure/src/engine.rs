@@ -259,9 +259,7 @@ mod tests {
     #[test]
     fn a_picture_is_finished_when_all_its_samples_are_there() {
         let of = |temporal: &str, block: &str| {
-            finished_after(
-                &serde_json::json!({ "window": 8, "alpha": 0.05, "temporal": temporal, "block": block }),
-            )
+            finished_after(&serde_json::json!({ "window": 8, "alpha": 0.05, "temporal": temporal, "block": block }))
         };
         let found = [("Off", "Two"), ("SlidingWindow", "Two"), ("Upscale", "Two"), ("Upscale", "Four")];
         assert_eq!(found.map(|(temporal, block)| of(temporal, block)), [4, 8, 32, 128]);
