@@ -235,7 +235,7 @@ fn finite_slabs_reflect_and_transmit_as_adding_says() {
                 spawn_sun(&mut app, Vec3::Y);
                 let view = spawn_pinhole(&mut app, UVec2::new(128, 96), up * mu);
                 // Little comes through the thick one at the least albedo: one path in seventy.
-                let frames = if depth > 1.0 && up > 0.0 { 512 } else { 32 };
+                let frames = if depth > 1.0 && up > 0.0 { 192 } else { 32 };
                 let found = mean(&mut app, &view, frames);
                 for (found, slab) in found.into_iter().zip(&slabs) {
                     let side = if up > 0.0 { slab.sky_scattered_through() } else { slab.sky_reflected() };

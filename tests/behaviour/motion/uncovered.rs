@@ -156,7 +156,7 @@ fn what_a_box_uncovers_is_right_within_four_frames() {
                 assert!(age <= gone || error < 1.05 * without, "{what}: {error}, {without} without it");
             }
             let [.., through] = whole.means();
-            assert!(whole.pixels > 600, "{mode:?} {resolution:?}: {} pixels", whole.pixels);
+            assert!(whole.pixels > 200, "{mode:?} {resolution:?}: {} pixels", whole.pixels);
             let ghost = if mode.1 == UpscaleBlock::Four { COARSE_GHOST } else { GHOST };
             assert!(through.abs() < ghost, "{mode:?} {resolution:?}: {through} of a ghost");
         }
