@@ -73,6 +73,25 @@ impl World {
     }
 }
 
+/// How a shift of the origin at this distance (m) shows: difference of the picture from the one before from frame to frame,
+/// over the shift, and where all that is held is lost; and the picture before.
+fn over_shift(world: &mut World, far: f64, settled: u32) -> ([f32; 3], Vec<Vec4>) {
+    world.stand(far, 5000.0, Vec3::ZERO);
+    world.picture();
+    run_updates(&mut world.app, settled);
+    let before = world.now();
+    let next = |world: &mut World| {
+        run_updates(&mut world.app, 1);
+        rms(&before, &world.now())
+    };
+    let usual = next(world);
+    world.stand(far, 5000.0, Vec3::new(65_536.0, -4096.0, -131_072.0));
+    let shifted = next(world);
+    world.app.world_mut().get_mut::<CloudView>(world.view.camera).unwrap().reset += 1;
+    let restarted = next(world);
+    ([usual, shifted, restarted], before)
+}
+
 fn rms(a: &[Vec4], b: &[Vec4]) -> f32 {
     (a.iter().zip(b).map(|(a, b)| a.distance_squared(*b)).sum::<f32>() / a.len() as f32).sqrt()
 }
@@ -103,18 +122,7 @@ fn an_origin_that_shifts_far_away_leaves_no_smear() {
     const FAR: f64 = 1e7;
     for temporal in [TemporalMode::SlidingWindow, TemporalMode::Exponential, TemporalMode::Upscale] {
         let mut world = world(temporal);
-        world.stand(FAR, 5000.0, Vec3::ZERO);
-        world.picture();
-        run_updates(&mut world.app, 16);
-        let before = world.now();
-        run_updates(&mut world.app, 1);
-        let usual = rms(&before, &world.now());
-        world.stand(FAR, 5000.0, Vec3::new(65_536.0, -4096.0, -131_072.0));
-        run_updates(&mut world.app, 1);
-        let shifted = rms(&before, &world.now());
-        world.app.world_mut().get_mut::<CloudView>(world.view.camera).unwrap().reset += 1;
-        run_updates(&mut world.app, 1);
-        let restarted = rms(&before, &world.now());
+        let ([usual, shifted, restarted], _) = over_shift(&mut world, FAR, 16);
         println!(
             "{temporal:?}: {usual:.5} from frame to frame, {shifted:.5} over the shift, {restarted:.5} if all is lost"
         );
@@ -131,18 +139,7 @@ fn the_planet_of_an_atmosphere_shifts_with_the_origin() {
     // Near enough that the planet's transform, in steps of half a metre, is as right before as after.
     const FAR: f64 = 1e5;
     let mut world = world_under(TemporalMode::SlidingWindow, Sky::Atmosphere);
-    world.stand(FAR, 5000.0, Vec3::ZERO);
-    world.picture();
-    run_updates(&mut world.app, 8);
-    let before = world.now();
-    run_updates(&mut world.app, 1);
-    let usual = rms(&before, &world.now());
-    world.stand(FAR, 5000.0, Vec3::new(65_536.0, -4096.0, -131_072.0));
-    run_updates(&mut world.app, 1);
-    let shifted = rms(&before, &world.now());
-    world.app.world_mut().get_mut::<CloudView>(world.view.camera).unwrap().reset += 1;
-    run_updates(&mut world.app, 1);
-    let restarted = rms(&before, &world.now());
+    let ([usual, shifted, restarted], before) = over_shift(&mut world, FAR, 8);
     // And none of it is held from before.
     let anew = rms(&before, &world.picture());
     // An error of the planet's place does show.

@@ -24,8 +24,10 @@ impl Folder {
         Self(folder)
     }
 
+    /// In one step: a load still on its way must not find the file half written.
     fn write(&self, file: &str, bytes: &[u8]) {
-        fs::write(self.0.join(file), bytes).expect("the folder can be written");
+        let next = self.0.join("next");
+        fs::write(&next, bytes).and_then(|()| fs::rename(&next, self.0.join(file))).expect("the folder can be written");
     }
 }
 

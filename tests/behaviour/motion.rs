@@ -109,6 +109,27 @@ fn pose(app: &mut App, view: &View, sun: Entity, motion: Motion, k: u32) {
     app.world_mut().resource_mut::<CloudClock>().seconds = motion.seconds * f64::from(k);
 }
 
+/// How far from the truth of where a motion ends a mode's picture is, at rest there and after so many frames of the motion.
+fn at_rest_and_moving(
+    app: &mut App,
+    view: &View,
+    sun: Entity,
+    (motion, frames): (Motion, u32),
+    mode: Mode,
+    truth: &Picture,
+) -> [f32; 2] {
+    app.insert_resource(quality(mode));
+    start_over(app, view);
+    run_updates(app, frames);
+    let rest = rms(&picture(app, view), truth);
+    start_over(app, view);
+    for k in 0..frames {
+        pose(app, view, sun, motion, k);
+        run_updates(app, 1);
+    }
+    [rest, rms(&picture(app, view), truth)]
+}
+
 #[test]
 fn in_motion_a_picture_is_nearly_as_good_as_at_rest() {
     const FRAMES: u32 = 16;
@@ -118,16 +139,7 @@ fn in_motion_a_picture_is_nearly_as_good_as_at_rest() {
         let truth = truth(&mut app, &view, MarchResolution::Full);
         let mut single = 0.0;
         for mode in all() {
-            app.insert_resource(quality(mode));
-            start_over(&mut app, &view);
-            run_updates(&mut app, FRAMES);
-            let rest = rms(&picture(&app, &view), &truth);
-            start_over(&mut app, &view);
-            for k in 0..FRAMES {
-                pose(&mut app, &view, sun, motion, k);
-                run_updates(&mut app, 1);
-            }
-            let moving = rms(&picture(&app, &view), &truth);
+            let [rest, moving] = at_rest_and_moving(&mut app, &view, sun, (motion, FRAMES), mode, &truth);
             println!("{} {mode:?}: {rest:.4} at rest, {moving:.4} in motion, {single:.4} alone", motion.name);
             let most = match mode {
                 (TemporalMode::Off, _) => {
@@ -178,16 +190,7 @@ fn layers_are_taken_along_with_their_own_wind() {
         let truth = truth(&mut app, &view, MarchResolution::Full);
         let behind = rms(&earlier, &truth);
         for mode in HELD {
-            app.insert_resource(quality(mode));
-            start_over(&mut app, &view);
-            run_updates(&mut app, FRAMES);
-            let rest = rms(&picture(&app, &view), &truth);
-            start_over(&mut app, &view);
-            for k in 0..FRAMES {
-                pose(&mut app, &view, sun, motion, k);
-                run_updates(&mut app, 1);
-            }
-            let moving = rms(&picture(&app, &view), &truth);
+            let [rest, moving] = at_rest_and_moving(&mut app, &view, sun, (motion, FRAMES), mode, &truth);
             println!("{name} {mode:?}: {rest:.4} at rest, {moving:.4} in motion, {behind:.4} left behind");
             let most = rest + 0.5 * behind;
             assert!(moving < most, "{name} {mode:?}: {moving} in motion, {rest} at rest, {behind} left behind");

@@ -225,7 +225,11 @@ fn told(app: &mut App) -> String {
 fn settings_follow_a_file_and_keep_the_last_good_one() {
     let folder = Folder::new();
     let file = folder.join("sky.clouds.ron");
-    let write = |text: &str| fs::write(&file, text).expect("the folder can be written");
+    // In one step: a load still on its way must not find the file half written.
+    let write = |text: &str| {
+        let next = folder.join("next.ron");
+        fs::write(&next, text).and_then(|()| fs::rename(&next, &file)).expect("the folder can be written");
+    };
     let [overcast, storm] = ["Overcast", "Storm"].map(preset);
     write(&overcast.to_ron());
     let mut app = app_in(&folder);
