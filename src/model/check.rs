@@ -27,11 +27,12 @@ pub(super) enum Verdict {
 }
 
 /// Modules that a model may import, as they were when the crate was built: at the app's start they are not loaded yet.
-const LIBRARY: [(&str, &str); 7] = [
+const LIBRARY: [(&str, &str); 8] = [
     ("embedded://bevy_cumulus/model/medium.wesl", include_str!("medium.wesl")),
     ("embedded://bevy_cumulus/model/planet.wesl", include_str!("planet.wesl")),
     ("embedded://bevy_cumulus/model/data.wesl", include_str!("data.wesl")),
     ("embedded://bevy_cumulus/model/zones.wesl", include_str!("zones.wesl")),
+    ("embedded://bevy_cumulus/model/map.wesl", include_str!("map.wesl")),
     ("embedded://bevy_cumulus/model/places.wesl", include_str!("places.wesl")),
     ("embedded://bevy_cumulus/model/profile.wesl", include_str!("profile.wesl")),
     ("embedded://bevy_cumulus/model/layer.wesl", include_str!("layer.wesl")),

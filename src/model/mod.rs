@@ -65,6 +65,7 @@ impl Plugin for CloudModelPlugin {
         load_shader_library!(app, "planet.wesl");
         load_shader_library!(app, "data.wesl");
         load_shader_library!(app, "zones.wesl");
+        load_shader_library!(app, "map.wesl");
         load_shader_library!(app, "places.wesl");
         load_shader_library!(app, "profile.wesl");
         load_shader_library!(app, "layer.wesl");

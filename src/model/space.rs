@@ -1,6 +1,11 @@
 //! The tangent frame that densities are asked in.
 
-use glam::{DQuat, DVec2, DVec3};
+use glam::{DMat2, DQuat, DVec2, DVec3};
+
+use crate::reference::planet::map_position;
+
+/// Most that the map is stretched: 15 700 km from its pole. Beyond that clouds slide a little as the camera passes.
+const MOST_STRETCH: f64 = 4.0;
 
 /// A frame on the planet's surface straight below a point: y up, origin at altitude 0. Computed in f64, so that what
 /// is sent to the GPU is small and exact however far from the origin the point is.
@@ -12,6 +17,9 @@ pub(crate) struct TangentFrame {
     pub altitude: f64,
     /// Position of the frame's origin on the map (m): arc lengths from the planet's pole (world +Y).
     pub map: DVec2,
+    /// Lengths on the map around there over those on the ground: 1 towards the pole and more across, where the map spreads
+    /// out what lies closer together on the planet. Without it clouds would slide as the camera goes across.
+    pub stretch: DMat2,
     /// World axes to the frame's.
     pub local_from_world: DQuat,
 }
@@ -24,10 +32,25 @@ impl TangentFrame {
         let up = from_centre.try_normalize()?;
         let across = DVec2::new(up.x, up.z);
         // Azimuthal equidistant around the pole: true lengths along any line through the world's origin.
-        let map = across.normalize_or_zero() * across.length().atan2(up.y) * radius;
-        let frame =
-            Self { radius, altitude: distance - radius, map, local_from_world: DQuat::from_rotation_arc(up, DVec3::Y) };
+        let outward = across.normalize_or_zero();
+        let angle = across.length().atan2(up.y);
+        let map = outward * angle * radius;
+        let spread = if angle > 1e-6 { (angle / angle.sin().max(1e-9)).min(MOST_STRETCH) } else { 1.0 };
+        let sideways = outward.perp();
+        let stretch = DMat2::IDENTITY + DMat2::from_cols(sideways * sideways.x, sideways * sideways.y) * (spread - 1.0);
+        let local_from_world = DQuat::from_rotation_arc(up, DVec3::Y);
+        let frame = Self { radius, altitude: distance - radius, map, stretch, local_from_world };
         (distance.is_finite() && map.is_finite()).then_some(frame)
+    }
+
+    /// The most that [`stretch`](Self::stretch) lengthens: it leaves lengths towards the pole as they are.
+    pub fn longest(&self) -> f64 {
+        self.stretch.determinant().max(1.0)
+    }
+
+    /// Where a point of this frame is on the map, from below the frame's own (m).
+    pub fn map_at(&self, local: DVec3) -> DVec2 {
+        self.stretch * map_position(local, self.radius)
     }
 }
 
@@ -49,6 +72,25 @@ mod tests {
         assert!((there.map.x - r * angle).abs() < 1e-3 && there.map.y.abs() < 1e-6);
         let up = there.local_from_world * DVec3::new(angle.sin(), angle.cos(), 0.0);
         assert!((up - DVec3::Y).length() < 1e-12);
+    }
+
+    #[test]
+    fn neighbours_agree_on_the_map_all_over_the_planet() {
+        let r = 6_360_000.0;
+        let centre = DVec3::new(0.0, -r, 0.0);
+        let up = |degrees: f64, aside: f64| {
+            let (sin, cos) = degrees.to_radians().sin_cos();
+            DVec3::new(sin, cos, aside / r).normalize()
+        };
+        for degrees in [0.0, 1.0, 20.0, 60.0, 90.0, 120.0] {
+            // A kilometre to the side, as seen from here and from there.
+            let [here, there] = [0.0, 1000.0].map(|aside| centre + (r + 500.0) * up(degrees, aside));
+            let frame = |eye| TangentFrame::below(eye, centre, r).unwrap();
+            let seen = frame(here);
+            let local = seen.local_from_world * (there - here) + DVec3::Y * seen.altitude;
+            let apart = (seen.map + seen.map_at(local) - frame(there).map).length();
+            assert!(apart < 1.0, "{degrees} degrees from the pole: {apart} m");
+        }
     }
 
     #[test]

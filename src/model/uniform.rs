@@ -4,7 +4,7 @@ use bevy::{
     prelude::*,
     render::render_resource::{ShaderType, TextureView},
 };
-use glam::DVec2;
+use glam::{DMat2, DVec2, DVec4};
 
 use super::{
     TangentFrame,
@@ -93,6 +93,8 @@ pub(crate) struct ModelUniform {
     pub texels: Vec4,
     pub map_texels: Vec4,
     pub albedo: Vec4,
+    pub stretch: Vec4,
+    pub shrink: Vec4,
     pub counts: UVec4,
     pub decks: [Vec4; 5],
     pub bounds: Vec4,
@@ -208,6 +210,8 @@ impl ModelUniform {
                 0.0,
             ),
             albedo: model.albedo.extend(1.0),
+            stretch: packed(frame.stretch, frame.longest()),
+            shrink: packed(frame.stretch.inverse(), 1.0),
             ..default()
         }
     }
@@ -218,6 +222,11 @@ impl ModelUniform {
     pub fn erosion(&self) -> Erosion {
         if self.erosion == 0 { Erosion::Subtract } else { Erosion::Remap }
     }
+}
+
+/// A symmetric matrix, and the most that it lengthens.
+fn packed(m: DMat2, longest: f64) -> Vec4 {
+    DVec4::new(m.x_axis.x, m.x_axis.y, m.y_axis.y, longest).as_vec4()
 }
 
 /// Position in repeats of `scale`, wrapped to 0..1 in f64: exact after hours of wind, far from the origin.

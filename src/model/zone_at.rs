@@ -39,13 +39,13 @@ impl ZoneAt {
     /// How far its rim is from a camera at `position`, over the ground (m), and the zone in the frame below that.
     pub fn seen_from(&self, position: DVec3, frame: &TangentFrame) -> (f64, ZoneUniform) {
         let local = frame.local_from_world * (self.centre - position) + DVec3::Y * frame.altitude;
-        let map = map_position(local, frame.radius);
+        let map = frame.map_at(local);
         let place = map.as_vec2();
         let zone = ZoneUniform {
             place: Vec4::new(place.x, place.y, self.radius, self.edge),
             // At full strength more than map and coverage together, whatever they are.
             strength: Vec4::new(self.strength * (1.0 + self.strength * self.strength), 0.0, 0.0, 0.0),
         };
-        (map.length() - f64::from(self.radius), zone)
+        (map_position(local, frame.radius).length() - f64::from(self.radius), zone)
     }
 }

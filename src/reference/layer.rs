@@ -5,15 +5,13 @@ use bevy::math::{DVec2, DVec3, DVec4, Vec4Swizzles};
 use super::{
     field::{FADE, MEAN_LEVEL, Medium, ModelTextures, level, mix, smoothstep},
     places::{bound_at, read_at, steepest, waves_at},
-    planet::map_position,
-    zones::{zones_at, zones_bound},
+    zones::Zones,
 };
-use crate::model::{FINER, LayerUniform, ZoneUniform};
+use crate::model::{FINER, LayerUniform, TangentFrame};
 
 /// How many places the waves' sum steps over where it changes by 1.
 const PLACES: f64 = 2.0;
 const RAIN_THICKENS: f64 = 3.0;
-const RAIN_ABSORBS: f64 = 0.02;
 /// Of light scattered by rain.
 const RAIN_ALBEDO: f64 = 0.999;
 const SHEET: u32 = 1;
@@ -21,8 +19,8 @@ const SHEET: u32 = 1;
 /// A layer with what it reads.
 pub(super) struct Layer<'a, T> {
     pub layer: &'a LayerUniform,
-    pub zones: &'a [ZoneUniform],
-    pub radius: f64,
+    pub zones: Zones<'a>,
+    pub frame: &'a TangentFrame,
     pub textures: &'a T,
 }
 
@@ -65,14 +63,14 @@ impl<T: ModelTextures> Layer<'_, T> {
         if h - reach < f64::from(layer.base) {
             skew = skew.max(layer.rain_lean.as_dvec2().length());
         }
-        let wide = reach * (1.0 + skew);
+        let wide = reach * (self.frame.longest() + skew);
         let mut most = self.map_bound(m, wide);
         let away = m.length();
         if away + wide > FADE[0] {
             most = most.max(self.read_map(layer.map_offset.xy().as_dvec2(), MEAN_LEVEL).w);
         }
         let far = self.far_coverage(away + wide).max(self.far_coverage((away - wide).max(0.0)));
-        let added = f64::from(layer.coverage) + far + zones_bound(self.zones, m, wide);
+        let added = f64::from(layer.coverage) + far + self.zones.bound(m, wide);
         ((most + added) * f64::from(layer.sharpness)).clamp(0.0, 1.0)
     }
 
@@ -95,8 +93,12 @@ impl<T: ModelTextures> Layer<'_, T> {
         }
         let base = f64::from(layer.base) + f64::from(layer.base_rise) * w.z;
         let x = (h - base) / (f64::from(layer.thickness) * w.y).max(1.0);
+        if x >= 1.0 {
+            return Medium::EMPTY;
+        }
+        let coverage = self.within_tower(w.x, x);
         if x <= 0.0 {
-            let fall = self.rain_at(m, h, base, w.x, lod);
+            let fall = self.rain_at(m, h, base, coverage, lod);
             return Medium {
                 density: fall,
                 extinction: fall * f64::from(layer.rain_extinction),
@@ -105,25 +107,18 @@ impl<T: ModelTextures> Layer<'_, T> {
                 ..Medium::EMPTY
             };
         }
-        if x >= 1.0 {
-            return Medium::EMPTY;
-        }
-        // Below its anvil a cloud keeps to where coverage is high.
-        let anvil = f64::from(layer.anvil);
-        let narrow = anvil * mix(0.55, 0.0, smoothstep(0.6, 0.8, x));
-        let coverage = ((w.x - narrow) / (1.0 - narrow)).clamp(0.0, 1.0);
-        let spread = anvil * smoothstep(0.68, 0.76, x) * (1.0 - smoothstep(0.9, 1.0, x));
+        let spread = f64::from(layer.anvil) * smoothstep(0.68, 0.76, x) * (1.0 - smoothstep(0.9, 1.0, x));
         let signal = height_signal(x, layer.peak_height.into()).max(spread);
         let profile = (coverage * signal * f64::from(layer.profile_strength)).clamp(0.0, 1.0);
         let density = self.cloud_density(m, h, x, profile, lod) * f64::from(layer.density);
         if density <= 0.0 {
             return Medium::EMPTY;
         }
-        let rain = f64::from(layer.rain) * (1.0 - x) * smoothstep(0.35, 0.9, w.x);
+        let rain = self.rain_bound(coverage) * (1.0 - x);
         Medium {
             density,
             extinction: density * f64::from(layer.extinction) * (1.0 + RAIN_THICKENS * rain),
-            albedo: layer.albedo.xyz().as_dvec3() * (1.0 - RAIN_ABSORBS * rain),
+            albedo: layer.albedo.xyz().as_dvec3(),
             profile,
             phase: self.phase(),
             ..Medium::EMPTY
@@ -144,6 +139,12 @@ impl<T: ModelTextures> Layer<'_, T> {
             }
         }
         if layer.rain > 0.0 || layer.turbulence > 0.0 { finest.min(texels[3]) } else { finest }
+    }
+
+    /// Below its anvil a cloud keeps to where coverage is high, and so does its rain.
+    fn within_tower(&self, coverage: f64, x: f64) -> f64 {
+        let narrow = f64::from(self.layer.anvil) * mix(0.55, 0.0, smoothstep(0.6, 0.8, x));
+        ((coverage - narrow) / (1.0 - narrow)).clamp(0.0, 1.0)
     }
 
     fn phase(&self) -> DVec4 {
@@ -184,7 +185,7 @@ impl<T: ModelTextures> Layer<'_, T> {
         if fade > 0.0 {
             w = w.lerp(self.read_map(at, MEAN_LEVEL), fade);
         }
-        w.x += f64::from(layer.coverage) + self.far_coverage(away) + zones_at(self.zones, m);
+        w.x += f64::from(layer.coverage) + self.far_coverage(away) + self.zones.at(m);
         w.x = (w.x * f64::from(layer.sharpness)).clamp(0.0, 1.0);
         w
     }
@@ -199,7 +200,7 @@ impl<T: ModelTextures> Layer<'_, T> {
         } else {
             layer.lean.as_dvec2() * (-above / f64::from(layer.thickness))
         };
-        map_position(p, self.radius) + slant
+        self.frame.map_at(p) + slant
     }
 
     /// Displacement by the curl field, most at the base (m).

@@ -1,6 +1,9 @@
 //! How fast the clouds that are shown move: by altitude, and as the camera sees it.
 
-use bevy::prelude::*;
+use bevy::{
+    math::{DMat2, DVec2},
+    prelude::*,
+};
 
 use crate::settings::{CloudLayer, CloudModel, MAX_LAYERS};
 
@@ -67,6 +70,15 @@ impl Winds {
         winds
     }
 
+    /// As they go over the ground where the map is stretched; `shrink` is from lengths on the map to those there.
+    pub fn over_ground(mut self, shrink: DMat2) -> Self {
+        for band in &mut self.bands {
+            let wind = shrink * DVec2::new(band.x.into(), band.z.into());
+            (band.x, band.z) = (wind.x as f32, wind.y as f32);
+        }
+        self
+    }
+
     /// The different winds (m/s).
     pub fn all(&self) -> impl Iterator<Item = Vec3> {
         self.bands.iter().map(|band| band.truncate())
@@ -95,6 +107,8 @@ mod tests {
         for (altitude, wind) in [(1500.0, low), (4000.0, low), (6000.0, high), (8500.0, high), (1e6, high)] {
             assert_eq!(at(&winds, altitude), wind.with_y(0.0), "{altitude} m");
         }
+        let across = winds.over_ground(DMat2::from_diagonal(DVec2::new(1.0, 0.5)));
+        assert_eq!(at(&across, 1500.0), Vec3::new(7.0, 0.0, 1.5));
         // Noise that rises, evolution and renewal.
         assert_eq!(winds.rise, 3.5);
         // A low cloud's slow wind moves it faster across the view than the jet stream does cirrus.
