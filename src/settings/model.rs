@@ -93,7 +93,9 @@ pub struct CloudModel {
     /// Position of the world's origin on the planet's map (m, f64): change it when a floating origin shifts, by as much as
     /// all entities are moved back. Move the `Atmosphere`'s along as well (Bevy gives it no `Transform`), or Bevy's sky does
     /// not stay where it is; left at its default place, its planet still does for clouds. It is 6360 km away, where
-    /// transforms have steps of half a metre: shift by whole metres. Default 0.
+    /// transforms have steps of half a metre: shift by whole metres. Far from the planet's top (+Y of its centre) the map is
+    /// stretched across the line to there, so clouds are narrower: by 0.4 % after 1000 km, to two thirds after 10 000 km.
+    /// Default 0.
     #[reflect(@-1.0e12..=1.0e12_f32)]
     pub world_offset: DVec3,
 }
