@@ -33,14 +33,21 @@ impl TangentFrame {
         let across = DVec2::new(up.x, up.z);
         // Azimuthal equidistant around the pole: true lengths along any line through the world's origin.
         let outward = across.normalize_or_zero();
-        let angle = across.length().atan2(up.y);
+        let sine = across.length();
+        let angle = sine.atan2(up.y);
         let map = outward * angle * radius;
-        let spread = if angle > 1e-6 { (angle / angle.sin().max(1e-9)).min(MOST_STRETCH) } else { 1.0 };
+        // At the pole, 0 over 0, there is no sideways.
+        let spread = (angle / sine).min(MOST_STRETCH);
         let sideways = outward.perp();
         let stretch = DMat2::IDENTITY + DMat2::from_cols(sideways * sideways.x, sideways * sideways.y) * (spread - 1.0);
         let local_from_world = DQuat::from_rotation_arc(up, DVec3::Y);
         let frame = Self { radius, altitude: distance - radius, map, stretch, local_from_world };
         (distance.is_finite() && map.is_finite()).then_some(frame)
+    }
+
+    /// From lengths on the map back to those on the ground.
+    pub fn shrink(&self) -> DMat2 {
+        self.stretch.inverse()
     }
 
     /// The most that [`stretch`](Self::stretch) lengthens: it leaves lengths towards the pole as they are.

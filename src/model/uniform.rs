@@ -211,7 +211,7 @@ impl ModelUniform {
             ),
             albedo: model.albedo.extend(1.0),
             stretch: packed(frame.stretch, frame.longest()),
-            shrink: packed(frame.stretch.inverse(), 1.0),
+            shrink: packed(frame.shrink(), 1.0),
             ..default()
         }
     }

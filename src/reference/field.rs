@@ -4,7 +4,7 @@
 //! Offsets and rates are those that the shader is given (`model/uniform.rs`); positions are f64. What is read from
 //! textures comes through [`ModelTextures`]. A [`ModelShader`](crate::ModelShader) has no twin.
 
-use bevy::math::{DMat2, DVec2, DVec3, DVec4, Vec4Swizzles};
+use bevy::math::{DVec2, DVec3, DVec4, Vec4Swizzles};
 
 pub use super::texture_set::{DETAIL_SHARES, LayerSides, ModelTextures, SHAPE_SHARES};
 use super::{
@@ -184,9 +184,7 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
     }
 
     fn zones(&self) -> Zones<'_> {
-        let [xx, xy, yy] = self.model.shrink.xyz().as_dvec3().to_array();
-        let all = &self.model.zones[..self.model.counts.w as usize];
-        Zones { all, shrink: DMat2::from_cols_array(&[xx, xy, xy, yy]) }
+        Zones { all: &self.model.zones[..self.model.counts.w as usize], shrink: self.frame.shrink() }
     }
 
     /// As [`density_bound`](Self::density_bound), of the thesis's layer; `h` is the altitude of `p`.

@@ -421,7 +421,7 @@ fn window_state(
         sun,
         exposure: item.camera.exposure,
         seconds: clouds.settings.clock.seconds,
-        winds: Winds::new(model, layers(), altitude).over_ground(space.stretch.inverse()),
+        winds: Winds::new(model, layers(), altitude).over_ground(space.shrink()),
         outlines: clouds.outline_speed,
         to_shell,
         texel: texel_angle(view.clip_from_view, viewport, quality),

@@ -42,6 +42,12 @@ impl Folder {
         fs::create_dir_all(&path).expect("the temporary folder can be written");
         Self(path)
     }
+
+    /// In one step: a load still on its way must not find the file half written.
+    pub fn write(&self, file: &str, bytes: impl AsRef<[u8]>) {
+        let next = self.join("next");
+        fs::write(&next, bytes).and_then(|()| fs::rename(&next, self.join(file))).expect("the folder can be written");
+    }
 }
 
 impl Deref for Folder {

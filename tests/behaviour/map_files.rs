@@ -1,7 +1,5 @@
 //! Layers' maps from files of each kind, hot-reloaded, and by channel.
 
-use std::{fs, path::PathBuf};
-
 use bevy::{math::DVec3, prelude::*};
 use bevy_cumulus::{ModelShader, prelude::*, settings::MapChannels, textures::CloudTextureStatus};
 use image::{ImageFormat, Rgba32FImage, RgbaImage};
@@ -9,36 +7,14 @@ use image::{ImageFormat, Rgba32FImage, RgbaImage};
 use crate::{
     bound::{ask, at},
     gpu::{run_until, run_updates, times_logged},
+    headless::Folder,
     layers::show,
     view::clouds_app_in,
     weather::convert::{encoded, ktx2},
 };
 
-/// A folder of assets that goes when the test ends.
-struct Folder(PathBuf);
-
-impl Folder {
-    fn new(name: &str) -> Self {
-        let folder = std::env::temp_dir().join(format!("cumulus-maps-{name}-{}", std::process::id()));
-        fs::create_dir_all(&folder).expect("the temporary folder can be written");
-        Self(folder)
-    }
-
-    /// In one step: a load still on its way must not find the file half written.
-    fn write(&self, file: &str, bytes: &[u8]) {
-        let next = self.0.join("next");
-        fs::write(&next, bytes).and_then(|()| fs::rename(&next, self.0.join(file))).expect("the folder can be written");
-    }
-}
-
-impl Drop for Folder {
-    fn drop(&mut self) {
-        let _ = fs::remove_dir_all(&self.0);
-    }
-}
-
 fn app(folder: &Folder) -> App {
-    let mut app = clouds_app_in(&folder.0);
+    let mut app = clouds_app_in(folder);
     run_until(&mut app, "the textures are baked", 600, |app| {
         !app.world().resource::<CloudTextureStatus>().baking && ModelShader::bindings(app, DVec3::ZERO).is_ok()
     });
@@ -87,12 +63,12 @@ fn assert_is(found: f32, byte: u8, what: &str) {
 
 #[test]
 fn maps_come_from_png_ktx2_and_exr() {
-    let folder = Folder::new("formats");
+    let folder = Folder::new();
     let texel = |coverage: u8| [coverage, 255, 0, 255];
-    folder.write("a.png", &png(texel(51)));
-    folder.write("b.ktx2", &ktx2([texel(102); 2].as_flattened().try_into().expect("two texels")));
+    folder.write("a.png", png(texel(51)));
+    folder.write("b.ktx2", ktx2([texel(102); 2].as_flattened().try_into().expect("two texels")));
     let real = texel(153).map(|byte| f32::from(byte) / 255.0);
-    folder.write("c.exr", &encoded(Rgba32FImage::from_pixel(4, 4, image::Rgba(real)), ImageFormat::OpenExr));
+    folder.write("c.exr", encoded(Rgba32FImage::from_pixel(4, 4, image::Rgba(real)), ImageFormat::OpenExr));
     let mut app = app(&folder);
     let unsuited = "does not match AssetLoader settings type";
     let logged = times_logged(unsuited);
@@ -110,14 +86,14 @@ fn maps_come_from_png_ktx2_and_exr() {
 
 #[test]
 fn a_map_that_changes_is_taken_at_once() {
-    let folder = Folder::new("reloaded");
-    folder.write("map.png", &png([51, 255, 0, 255]));
+    let folder = Folder::new();
+    folder.write("map.png", png([51, 255, 0, 255]));
     let mut app = app(&folder);
     let layer = bare("map.png", 1000.0);
     let model = show(&mut app, std::slice::from_ref(&layer));
     assert_is(density(&mut app, &model, &layer), 51, "as it was");
     // What a file watcher does.
-    folder.write("map.png", &png([204, 255, 0, 255]));
+    folder.write("map.png", png([204, 255, 0, 255]));
     let server = app.world().resource::<AssetServer>().clone();
     server.reload("map.png");
     let image = server.get_handle::<Image>("map.png").expect("it is loaded");
@@ -134,9 +110,9 @@ fn a_map_that_changes_is_taken_at_once() {
 
 #[test]
 fn four_layers_on_four_channels_of_one_image_are_four_skies() {
-    let folder = Folder::new("channels");
+    let folder = Folder::new();
     let texel = [26, 77, 128, 204];
-    folder.write("four.png", &png(texel));
+    folder.write("four.png", png(texel));
     let mut app = app(&folder);
     let channels = [MapChannels::Red, MapChannels::Green, MapChannels::Blue, MapChannels::Alpha];
     let layers: Vec<CloudLayer> = (0..4_u8)

@@ -224,12 +224,7 @@ fn told(app: &mut App) -> String {
 #[test]
 fn settings_follow_a_file_and_keep_the_last_good_one() {
     let folder = Folder::new();
-    let file = folder.join("sky.clouds.ron");
-    // In one step: a load still on its way must not find the file half written.
-    let write = |text: &str| {
-        let next = folder.join("next.ron");
-        fs::write(&next, text).and_then(|()| fs::rename(&next, &file)).expect("the folder can be written");
-    };
+    let write = |text: &str| folder.write("sky.clouds.ron", text);
     let [overcast, storm] = ["Overcast", "Storm"].map(preset);
     write(&overcast.to_ron());
     let mut app = app_in(&folder);
