@@ -205,6 +205,7 @@ fn view_bind_groups(
     let frame = item.uniforms.frame.binding()?;
     let world_from_local = item.uniforms.world_from_local.binding()?;
     let held = item.uniforms.held.binding()?;
+    let blue_noise = textures.blue_noise.as_ref()?;
     let history = item.history;
     let group = |label: &'static str, descriptor: &BindGroupLayoutDescriptor, entries: &[BindGroupEntry]| {
         device.create_bind_group(label, &layout(descriptor), entries)
@@ -249,7 +250,7 @@ fn view_bind_groups(
                     &BindGroupEntries::sequential((
                         frame.clone(),
                         sky_light.as_entire_binding(),
-                        textures.blue_noise.as_ref()?,
+                        blue_noise,
                         depth,
                         history.newest(),
                         history.marched_distances(),
@@ -288,8 +289,17 @@ fn view_bind_groups(
         }
     };
     let full_size = |id, label, layout: &[BindGroupLayoutDescriptor; 2], written: &TextureView| {
-        let entries =
-            BindGroupEntries::sequential((frame.clone(), history.sum_after(), &history.distances, depth, written));
+        let entries = BindGroupEntries::sequential((
+            frame.clone(),
+            &history.frames_view,
+            history.sum_after(),
+            depth,
+            &history.marched_view,
+            held.clone(),
+            &history.distances,
+            written,
+            blue_noise,
+        ));
         (id, group(label, &layout[ms], &entries))
     };
     let handed_out = |image: Option<AssetId<Image>>| image.and_then(|id| images.get(id));

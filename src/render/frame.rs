@@ -101,7 +101,7 @@ impl FrameUniform {
             view_from_clip: input.clip_from_view.inverse(),
             local_from_view: Mat4::from_quat(local_from_world * input.world_from_view),
             sun_direction: (local_from_world * sun.direction).extend(sun.angular_size),
-            sun_illuminance: (sun.illuminance * lighting.sun_strength).extend(0.0),
+            sun_illuminance: (sun.illuminance * lighting.sun_strength).extend(quality.light_reuse),
             phase_params: phases.params(),
             phase_kinds: phases.kinds(),
             phase_fall: phases.fall(),
@@ -180,8 +180,8 @@ fn reach(quality: &CloudQuality, lighting: &CloudLighting, space: &TangentFrame)
     to_horizon.max(least.lerp(all, share(ALL).powi(2)))
 }
 
-/// Where this frame samples pixel and step.
-fn offsets(quality: &CloudQuality, window: FrameInWindow) -> Vec4 {
+/// Where this frame samples texel and step.
+pub(super) fn offsets(quality: &CloudQuality, window: FrameInWindow) -> Vec4 {
     if quality.carries_picture() {
         // There is no window whose frames could share a step out: van der Corput's sequence fills it (Högfeldt 6.1).
         let sample = window.index / quality.block_side().pow(2);

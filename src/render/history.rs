@@ -9,6 +9,7 @@ use bevy::{
 };
 
 use super::{
+    frame::offsets,
     reproject::{HeldUniform, Pose, Sparse},
     versions::Versions,
 };
@@ -174,7 +175,11 @@ impl CloudHistory {
     /// Where the frames held before this one saw what this one sees.
     pub fn held_uniform(&self) -> HeldUniform {
         let still = self.held.front().is_some_and(|before| self.pose.stands_still(before, self.key.window as f32));
-        HeldUniform::new(&self.pose, self.held.iter(), still, self.sparse(), self.key.quality.samples_kept())
+        let held = self.held.iter().enumerate().map(|(k, pose)| {
+            let index = self.frame.index.wrapping_sub(k as u32 + 1);
+            (pose, offsets(&self.key.quality, FrameInWindow { index, ..self.frame }).xy())
+        });
+        HeldUniform::new(&self.pose, held, still, self.sparse(), self.key.quality.samples_kept())
     }
 
     /// Which texels this frame marches.

@@ -61,6 +61,7 @@ impl Plugin for CloudRenderPlugin {
         load_shader_library!(app, "accumulate/reproject.wesl");
         load_shader_library!(app, "composite/fade.wesl");
         load_shader_library!(app, "composite/upsample.wesl");
+        load_shader_library!(app, "composite/fine.wesl");
         load_shader_library!(app, "composite/pixel.wesl");
         load_shader_library!(app, "sky/sky.wesl");
         embedded_asset!(app, "march/march.wesl");

@@ -151,10 +151,14 @@ impl FromWorld for CloudPipelines {
                     compute,
                     (
                         frame(),
-                        texture_2d(unfiltered),
+                        texture_2d_array(unfiltered),
                         texture_2d(unfiltered),
                         depth_layout(multisampled),
+                        texture_2d_array(TextureSampleType::Uint),
+                        uniform_buffer::<HeldUniform>(false),
+                        texture_2d(unfiltered),
                         write(format),
+                        texture_2d(unfiltered),
                     ),
                 ),
             )

@@ -127,15 +127,19 @@ pub(crate) struct HeldUniform {
     clip_from_local: [Mat4; MOST_HELD],
     terms: [Vec4; MOST_HELD],
     moves: [Vec4; MOST_HELD],
+    places: [Vec4; MOST_HELD],
     winds: [Vec4; MOST_WINDS],
     counts: UVec4,
 }
+
+/// A frame held: where it was marched from, and the n-rooks offset of its samples.
+pub(crate) type HeldFrame<'a> = (&'a Pose, Vec2);
 
 impl HeldUniform {
     /// For a frame with this pose after `held` ones, the latest first. `march` says which texels are marched.
     pub fn new<'a>(
         now: &Pose,
-        held: impl ExactSizeIterator<Item = &'a Pose>,
+        held: impl ExactSizeIterator<Item = HeldFrame<'a>>,
         still: bool,
         march: Sparse,
         samples_kept: f32,
@@ -144,9 +148,10 @@ impl HeldUniform {
         let mut uniform = Self { counts, winds: now.winds.bands, ..default() };
         uniform.terms[0].z = samples_kept;
         let to_local = now.world_from_local.inverse();
-        for (k, before) in held.enumerate().take(MOST_HELD) {
+        for (k, (before, place)) in held.enumerate().take(MOST_HELD) {
             uniform.clip_from_local[k] = now.clip_of(before);
             uniform.moves[k] = (to_local * now.moved(before)).extend(0.0);
+            uniform.places[k] = place.extend(0.0).extend(0.0);
             let terms = &mut uniform.terms[k];
             let weight = if now.fits(before) { 1.0 } else { 0.0 };
             (terms.x, terms.y) = (weight, now.since(before));
@@ -272,7 +277,7 @@ mod tests {
         let all = Sparse::new(1, 0, UVec2::ONE);
         // As around.wesl takes the wind back.
         let seen = |now: &Pose, before: Pose| {
-            let held = HeldUniform::new(now, [before].iter(), false, all, 8.0);
+            let held = HeldUniform::new(now, [(&before, Vec2::ZERO)].into_iter(), false, all, 8.0);
             let carried = held.winds[0].truncate() * held.terms[0].y;
             let shift = held.moves[0].truncate() - carried;
             assert!((shift.length() - now.shift(&before)).abs() < 1e-3);
