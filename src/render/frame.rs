@@ -101,7 +101,7 @@ impl FrameUniform {
             view_from_clip: input.clip_from_view.inverse(),
             local_from_view: Mat4::from_quat(local_from_world * input.world_from_view),
             sun_direction: (local_from_world * sun.direction).extend(sun.angular_size),
-            sun_illuminance: (sun.illuminance * lighting.sun_strength).extend(quality.light_reuse),
+            sun_illuminance: (sun.illuminance * lighting.sun_strength).extend(0.0),
             phase_params: phases.params(),
             phase_kinds: phases.kinds(),
             phase_fall: phases.fall(),
@@ -126,7 +126,7 @@ impl FrameUniform {
                 reach.max(input.highest_horizon),
                 reach,
             ),
-            offsets: offsets(quality, *window),
+            offsets: offsets(quality, *window).extend(0.0),
             camera: Vec4::new(
                 space.altitude as f32,
                 space.radius as f32,
@@ -181,18 +181,17 @@ fn reach(quality: &CloudQuality, lighting: &CloudLighting, space: &TangentFrame)
 }
 
 /// Where this frame samples texel and step.
-pub(super) fn offsets(quality: &CloudQuality, window: FrameInWindow) -> Vec4 {
+pub(super) fn offsets(quality: &CloudQuality, window: FrameInWindow) -> Vec3 {
     if quality.carries_picture() {
         // There is no window whose frames could share a step out: van der Corput's sequence fills it (Högfeldt 6.1).
         let sample = window.index / quality.block_side().pow(2);
         let [x, y] = n_rooks(MAX_WINDOW)[sample as usize % MAX_WINDOW];
-        return Vec4::new(x, y, van_der_corput(sample), 1.0);
+        return Vec3::new(x, y, van_der_corput(sample));
     }
     let rooks = n_rooks(window.window as usize);
     let slot = window.index % window.window;
     let [x, y] = rooks[slot as usize % rooks.len()];
-    let stratum = 1.0 / window.window as f32;
-    Vec4::new(x, y, slot as f32 * stratum, stratum)
+    Vec3::new(x, y, slot as f32 / window.window as f32)
 }
 
 /// The binary digits of `i` mirrored at the point: 0, ½, ¼, ¾, ... No more than 16 of them, so that f32 holds it.

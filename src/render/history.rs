@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use bevy::{
-    math::Vec4Swizzles,
+    math::{Vec3Swizzles, Vec4Swizzles},
     prelude::*,
     render::{render_resource::*, renderer::RenderDevice},
 };

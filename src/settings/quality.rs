@@ -137,11 +137,6 @@ pub struct CloudQuality {
     /// Factor from one step towards the sun to the next: 1 is uniform. Default 1.9.
     #[reflect(@1.0..=4.0_f32)]
     pub light_growth: f32,
-    /// Opacity of cloud along a ray for which one look at its shade will do: samples towards the sun, up, down and around
-    /// are taken anew once so much more was met, or five steps later. 0 takes them at every sample inside cloud; more is
-    /// cheaper, and coarser within thin cloud and behind thick. Default 0.05.
-    #[reflect(@0.0..=0.5_f32)]
-    pub light_reuse: f32,
     /// The march stops where transmittance falls to this (thesis: 0.075); what lies behind is only guessed at, for the sky
     /// that shines through. Default 0.01.
     #[reflect(@0.0..=0.9_f32)]
@@ -216,7 +211,6 @@ impl CloudQuality {
             light_steps: 6,
             light_step: 45.0,
             light_growth: 1.9,
-            light_reuse: 0.05,
             transmittance_stop: 0.01,
             density_skip: 0.002,
             max_distance: 150_000.0,
@@ -241,7 +235,6 @@ impl CloudQuality {
             light_steps: 16,
             light_step: 20.0,
             light_growth: 1.3,
-            light_reuse: 0.0,
             transmittance_stop: 0.005,
             density_skip: 0.001,
             window: 16,

@@ -26,7 +26,6 @@ pub fn single(app: &mut App, lighting: CloudLighting) {
         step: 50.0,
         step_growth: 0.0,
         light_steps: 0,
-        light_reuse: 0.0,
         transmittance_stop: 0.0,
         density_skip: 0.0,
         max_distance: 2_000_000.0,

@@ -82,7 +82,6 @@ pub fn exact_march(step: f32) -> CloudQuality {
         max_steps: 8192,
         light_steps: 0,
         light_growth: 1.0,
-        light_reuse: 0.0,
         transmittance_stop: 0.0,
         density_skip: 0.0,
         max_distance: 2_000_000.0,

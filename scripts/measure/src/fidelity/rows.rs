@@ -46,7 +46,7 @@ const PRESETS: [(&str, &str); 4] = [("low", "Low"), ("medium", "Medium"), (HIGH,
 type Change = (&'static str, &'static str, &'static [&'static str]);
 
 /// The approximations, each alone.
-const ALONE: [Change; 28] = [
+const ALONE: [Change; 27] = [
     ("octaves_1", "1 octave: single scattering", &["lighting.octaves=1"]),
     ("octaves_2", "2 octaves", &["lighting.octaves=2"]),
     ("octaves_3", "3 octaves", &["lighting.octaves=3"]),
@@ -60,7 +60,6 @@ const ALONE: [Change; 28] = [
     ("light_4", "4 light steps", &LIGHT_FEW),
     ("light_6", "6 light steps (Low's to High's)", &LIGHT_HIGH),
     ("light_16", "16 light steps (Ultra's)", &LIGHT_ULTRA),
-    ("light_reused", "shade reused up to an opacity of .05 (High's)", &["quality.light_reuse=0.05"]),
     ("step_140", "step 140 m (Low's)", &["quality.step=140", "quality.step_growth=0.014"]),
     ("step_90", "step 90 m (High's)", &["quality.step=90", "quality.step_growth=0.008"]),
     ("step_60", "step 60 m (Ultra's)", &["quality.step=60", "quality.step_growth=0.006"]),
@@ -83,7 +82,7 @@ const LIGHT_ULTRA: [&str; 3] = ["quality.light_steps=16", "quality.light_step=20
 const UPSCALE: [&str; 3] = ["quality.resolution=full", "quality.temporal=upscale", "quality.block=two"];
 
 /// Changes of the default preset: there a window does more than where steps are short.
-const FROM_HIGH: [Change; 9] = [
+const FROM_HIGH: [Change; 8] = [
     ("high_window_1", "High, 1 frame", &["quality.temporal=off"]),
     ("high_window_16", "High, 16 frames", &["quality.window=16"]),
     ("high_full", "High, full resolution", &["quality.resolution=full"]),
@@ -91,7 +90,6 @@ const FROM_HIGH: [Change; 9] = [
     ("high_upscale", "High, full resolution, a quarter of it a frame", &UPSCALE),
     ("high_step_60", "High, step 60 m", &["quality.step=60", "quality.step_growth=0.006"]),
     ("high_light_16", "High, 16 light steps", &LIGHT_ULTRA),
-    ("high_shade", "High, shade of every sample", &["quality.light_reuse=0"]),
     ("high_90", "High, 90 km", &["quality.max_distance=90000"]),
 ];
 

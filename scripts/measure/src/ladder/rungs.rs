@@ -11,8 +11,7 @@ pub struct Rung {
 /// All rungs see as far, and their steps are as long far away as near by, as the thesis's are. 36 km is what 9 m steps
 /// reach within `max_steps`.
 pub const DISTANCE: &str = "--set quality.max_distance=36000";
-const GROUND: &[&str] =
-    &["quality.max_distance=36000", "quality.step_growth=0", "quality.max_steps=8192", "quality.light_reuse=0"];
+const GROUND: &[&str] = &["quality.max_distance=36000", "quality.step_growth=0", "quality.max_steps=8192"];
 
 pub const RUNGS: [Rung; 7] = [
     Rung {

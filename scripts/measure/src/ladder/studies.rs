@@ -46,7 +46,7 @@ struct Ask {
 /// As Costa's program marches: every step alike, none left out, towards the sun as well.
 const PLAIN: &str = "--quality high --set quality.resolution=full --set quality.long_step=1 --set quality.step_growth=0 \
     --set quality.transmittance_stop=0 --set quality.density_skip=0 --set quality.max_steps=8192 \
-    --set quality.max_distance=36000 --set quality.light_growth=1 --set quality.light_reuse=0";
+    --set quality.max_distance=36000 --set quality.light_growth=1";
 /// The layer's thickness in the scene (m), which the eye steps divide, and the reach of the light steps (m).
 const THICKNESS: f64 = 2000.0;
 const LIGHT_REACH: f64 = 1000.0;
