@@ -32,7 +32,7 @@ pub struct CloudLighting {
     /// Strength of the sun's light that has been scattered so often that it diffuses, which the octaves lose (with two
     /// octaves or more): radiance at the lit side, in units of the sun's illuminance over 4π. Inside it is weighed
     /// against sky and ground by the optical depth to each; costs five samples of the medium. 0 is the thesis alone.
-    /// Default 5.5, fitted to the path tracer.
+    /// Default 5.25, fitted to the path tracer.
     #[reflect(@0.0..=40.0_f32)]
     pub diffusion: f32,
     /// Asymmetry of that light at its source: how much of it goes on away from the sun (0 all ways alike). That it is
@@ -102,7 +102,7 @@ impl Default for CloudLighting {
             attenuation: 0.69,
             contribution: 1.0,
             eccentricity: 0.65,
-            diffusion: 5.5,
+            diffusion: 5.25,
             diffusion_asymmetry: 0.0,
             phase: PhaseFunction::HgDraine,
             g: 0.8,
