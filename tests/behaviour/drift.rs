@@ -31,8 +31,8 @@ const LAYERS: u32 = WINDOW as u32 + 1;
 const CHANNELS: usize = 4 * TEXELS;
 /// As `pack_marched` of `held.wesl` puts it: nothing has changed for 255 frames.
 const UNCHANGED: u32 = 255 << 24;
-/// Bytes of `Held`: 16 matrices, 16 pairs of vectors, 9 winds and one vector more.
-const HELD_BYTES: u64 = 16 * (64 + 2 * 16) + 9 * 16 + 16;
+/// Bytes of `Held`: 16 matrices, 16 times three vectors, 9 winds and one vector more.
+const HELD_BYTES: u64 = 16 * (64 + 3 * 16) + 9 * 16 + 16;
 
 /// Byte offset of a member of `CloudFrame`, and the struct's size. Its members are matrices and vectors of four.
 fn place_of(member: &str) -> (usize, usize) {

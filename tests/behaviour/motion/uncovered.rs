@@ -107,6 +107,10 @@ fn by_age(behind: &[Picture], open: &[Picture], truth: &Picture, texel: u32) -> 
     ages
 }
 
+/// A mode whose picture is coarser than the truth cannot be right: it has to be no worse than this many times what it shows
+/// where there never was a box.
+const AS_IF_OPEN: f32 = 1.2;
+
 /// Frames after which what was uncovered has to be right, and the most that errors may then be, in those of single frames.
 fn due(mode: Mode) -> (usize, f32) {
     match mode {
@@ -146,7 +150,8 @@ fn what_a_box_uncovers_is_right_within_four_frames() {
                 let [error, without, through] = bare.means();
                 let what = format!("{mode:?} {resolution:?}, bare for {age} frames");
                 println!("{what}: {error:.4} behind the box, {without:.4} without it, {through:.4} too much");
-                assert!(mode == ALONE || error < most * alone, "{what}: {error}, single frames {alone}");
+                let right = error < most * alone || error < AS_IF_OPEN * without;
+                assert!(mode == ALONE || right, "{what}: {error}, {without} without it, single frames {alone}");
                 // Nothing is left of it once frames alone, or a window of them, have passed.
                 let gone = match mode.0 {
                     TemporalMode::Off => 1,
