@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 pub enum MarchResolution {
     /// One ray a pixel.
     Full,
-    /// One ray for 2×2 pixels; the default.
+    /// One ray for 2×2 pixels; the default. Each frame of [`TemporalMode::SlidingWindow`] samples another place of them,
+    /// so that the picture is nearly as fine as with [`Full`](Self::Full).
     #[default]
     Half,
     /// One ray for 4×4 pixels.
@@ -51,8 +52,10 @@ pub enum TemporalMode {
     Off,
     /// The thesis's unified TAA (4.5): the mean of the last `window` frames. While the camera stands still that is one
     /// addition and one subtraction; in motion each held frame is reprojected by its own camera, which costs in
-    /// proportion to `window` but far less than a march. What no longer fits is left out. A ray to what comes into view or
-    /// was hidden before takes twice the steps; after a cut none does, and single frames show their noise. The default.
+    /// proportion to `window` but far less than a march. Where marched texels are larger than pixels, each pixel takes the
+    /// samples around it, which costs in proportion to `window` too. What no longer fits is left out. A ray to what comes
+    /// into view or was hidden before takes twice the steps; after a cut none does, and single frames show their noise.
+    /// The default.
     #[default]
     SlidingWindow,
     /// The last picture, reprojected, with `alpha` of the newest frame blended in (Högfeldt 6.1). Two frames of memory;

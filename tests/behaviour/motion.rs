@@ -1,6 +1,7 @@
 //! Pictures in motion: as good as at rest, without ghosts, and at rest again without a jump.
 
 mod crossing;
+mod finer;
 mod uncovered;
 
 use bevy::{camera::Exposure, prelude::*};
