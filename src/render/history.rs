@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 
 use bevy::{
-    math::{Vec3Swizzles, Vec4Swizzles},
+    math::Vec4Swizzles,
     prelude::*,
     render::{render_resource::*, renderer::RenderDevice},
 };
@@ -177,7 +177,7 @@ impl CloudHistory {
         let still = self.held.front().is_some_and(|before| self.pose.stands_still(before, self.key.window as f32));
         let held = self.held.iter().enumerate().map(|(k, pose)| {
             let index = self.frame.index.wrapping_sub(k as u32 + 1);
-            (pose, offsets(&self.key.quality, FrameInWindow { index, ..self.frame }).xy())
+            (pose, offsets(&self.key.quality, FrameInWindow { index, ..self.frame }))
         });
         HeldUniform::new(&self.pose, held, still, self.sparse(), self.key.quality.samples_kept())
     }

@@ -132,8 +132,8 @@ pub(crate) struct HeldUniform {
     counts: UVec4,
 }
 
-/// A frame held: where it was marched from, and the n-rooks offset of its samples.
-pub(crate) type HeldFrame<'a> = (&'a Pose, Vec2);
+/// A frame held: where it was marched from, and the offsets of its samples.
+pub(crate) type HeldFrame<'a> = (&'a Pose, Vec3);
 
 impl HeldUniform {
     /// For a frame with this pose after `held` ones, the latest first. `march` says which texels are marched.
@@ -151,7 +151,7 @@ impl HeldUniform {
         for (k, (before, place)) in held.enumerate().take(MOST_HELD) {
             uniform.clip_from_local[k] = now.clip_of(before);
             uniform.moves[k] = (to_local * now.moved(before)).extend(0.0);
-            uniform.places[k] = place.extend(0.0).extend(0.0);
+            uniform.places[k] = place.extend(0.0);
             let terms = &mut uniform.terms[k];
             let weight = if now.fits(before) { 1.0 } else { 0.0 };
             (terms.x, terms.y) = (weight, now.since(before));
@@ -277,7 +277,7 @@ mod tests {
         let all = Sparse::new(1, 0, UVec2::ONE);
         // As around.wesl takes the wind back.
         let seen = |now: &Pose, before: Pose| {
-            let held = HeldUniform::new(now, [(&before, Vec2::ZERO)].into_iter(), false, all, 8.0);
+            let held = HeldUniform::new(now, [(&before, Vec3::ZERO)].into_iter(), false, all, 8.0);
             let carried = held.winds[0].truncate() * held.terms[0].y;
             let shift = held.moves[0].truncate() - carried;
             assert!((shift.length() - now.shift(&before)).abs() < 1e-3);

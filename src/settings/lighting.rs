@@ -31,7 +31,7 @@ pub struct CloudLighting {
     pub eccentricity: f32,
     /// Strength of the sun's light that has been scattered so often that it diffuses, which the octaves lose (with two
     /// octaves or more): radiance at the lit side, in units of the sun's illuminance over 4π. Inside it is weighed
-    /// against sky and ground by the optical depth to each; costs five samples of the medium. 0 is the thesis alone.
+    /// against sky and ground by the optical depth to each; costs six samples of the medium. 0 is the thesis alone.
     /// Default 5.25, fitted to the path tracer.
     #[reflect(@0.0..=40.0_f32)]
     pub diffusion: f32,
