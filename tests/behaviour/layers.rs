@@ -193,6 +193,46 @@ fn shafts_of_rain_slant_as_a_whole() {
     assert!(off(&high, &straight) > 0.3, "shafts hang straight down");
 }
 
+#[test]
+fn rain_hangs_from_the_tower_and_not_from_the_anvil() {
+    let (base, thickness) = (1500.0, 8000.0);
+    let layer = CloudLayer {
+        anvil: 0.9,
+        rain: 1.0,
+        rain_depth: 1500.0,
+        rain_slant: 0.0,
+        wind_skew: 0.0,
+        base,
+        thickness,
+        base_rise: 0.0,
+        // Nothing but the profile, and height the same everywhere.
+        shape_strength: 0.0,
+        detail_strength: 0.0,
+        turbulence: 0.0,
+        map: WeatherRecipe { height_variation: 0.0, ..map(4.0) },
+        ..cumulus()
+    };
+    let mut app = model_app();
+    let model = show(&mut app, &[layer]);
+    let mut rng = StdRng::seed_from_u64(550);
+    let mut within = |end: f32| rng.random_range(-end..end);
+    let places: Vec<Vec2> = (0..6000).map(|_| Vec2::new(within(2500.0), within(2500.0))).collect();
+    // The planet's curve takes half a metre within 2.5 km.
+    let mut density = |height: f32| -> Vec<f32> {
+        let questions: Vec<Question> = places.iter().map(|m| at(Vec3::new(m.x, height, m.y), 0.0)).collect();
+        ask(&mut app, &model, &questions).iter().map(|answer| answer[1]).collect()
+    };
+    let (anvil, tower, rain) = (density(base + 0.78 * thickness), density(base + 0.3 * thickness), density(base - 40.0));
+    let (mut overhung, mut wet) = (0, 0);
+    for ((anvil, tower), rain) in anvil.iter().zip(&tower).zip(&rain) {
+        overhung += u32::from(*anvil > 0.1 && *tower == 0.0);
+        wet += u32::from(*rain > 0.05);
+        assert!(*tower > 0.0 || *rain == 0.0, "rain of {rain} where no tower stands");
+    }
+    println!("{overhung} places under the anvil alone, {wet} in rain");
+    assert!(overhung > 200 && wet > 100, "{overhung} under the anvil alone, {wet} in rain");
+}
+
 /// Points within the layers, near enough that single clouds are told apart.
 fn points(model: &CloudModel, count: usize) -> Vec<Question> {
     let mut rng = StdRng::seed_from_u64(530);

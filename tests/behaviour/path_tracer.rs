@@ -15,6 +15,7 @@ use bevy_cumulus::{
 use crate::{
     adding::{Slab, gauss, h_function, moments},
     gpu::{run_compute, run_updates, shader_app},
+    stage::{settle, spawn_box},
     view::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, read_image, spawn_sun, spawn_view, until_drawn},
 };
 
@@ -157,6 +158,26 @@ fn clouds_merge_with_the_background_as_in_the_march() {
     app.insert_resource(CloudQuality { temporal: TemporalMode::Off, max_distance: end as f32, ..fine });
     let [.., marched] = mean(&mut app, &view, 2);
     assert_near(1.0 - marched, opacity, 0.01, "marched opacity");
+}
+
+#[test]
+fn paths_end_at_the_scene_with_any_number_of_samples() {
+    let depth = 3.0;
+    let mut app = traced_app(Some(slab(depth, [0.9; 3])), sun_light(PhaseFunction::Isotropic));
+    spawn_sun(&mut app, Vec3::NEG_Y);
+    let view = spawn_pinhole(&mut app, UVec2::new(96, 64), 1.0);
+    let within = Transform::from_xyz(0.0, 1500.5, 0.0);
+    let board = spawn_box(&mut app, Vec3::new(40.0, 1.0, 40.0), within, Vec3::ONE);
+    for msaa in [Msaa::Off, Msaa::Sample4] {
+        app.world_mut().entity_mut(view.camera).insert(msaa);
+        for (visibility, seen) in [(Visibility::Hidden, 1.0), (Visibility::Visible, 0.5)] {
+            app.world_mut().entity_mut(board).insert(visibility);
+            settle(&mut app);
+            let [light, .., through] = mean(&mut app, &view, 24);
+            assert_near(through, (-depth * seen).exp(), 0.01, &format!("transmittance, {msaa:?}, {seen} of the slab"));
+            assert!(light > 0.0, "no light with {msaa:?}");
+        }
+    }
 }
 
 #[test]

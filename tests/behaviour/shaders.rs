@@ -1,5 +1,5 @@
 //! Every variant of every pipeline but the path tracer's compiles and passes the device's validation. Those take a software
-//! driver minutes each: the path tracer's own tests and the headless example compile them, without MSAA.
+//! driver minutes each: the path tracer's own tests and the headless example compile them, with MSAA over a plain sky only.
 
 use std::collections::BTreeSet;
 

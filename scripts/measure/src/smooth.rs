@@ -1,33 +1,55 @@
 //! Takes the noise out of a reference without losing the detail of the cloud.
 //!
 //! The path tracer and the converged march see the same medium: they differ in what the light does, and that from place to
-//! place slowly. So the difference is smoothed, not the picture.
+//! place slowly. So what they differ by is smoothed, not the picture.
 
 use image::{Rgba, Rgba32FImage};
 
 /// Standard deviation of the smoothing (pixels).
 pub const RADIUS: f64 = 2.0;
+/// What is darker than so much of the clouds' mean counts less, in the ratio of light, than its brightness would have it.
+const DARK: f64 = 0.05;
 
-/// `noisy` with the detail of `guide`: the guide, plus its difference from the noisy picture, per opacity, smoothed over
-/// `RADIUS`. Clear sky stays clear, and nothing is taken from it.
+/// `noisy` with the detail of `guide`: the guide's light times the ratio of both's light around it, and the guide's
+/// transmittance plus what the noisy one's differs by around it, per opacity. Clear sky stays clear, and nothing is taken
+/// from it.
+///
+/// Light is a ratio since it spans a hundredfold within a few pixels of a low sun, where a smoothed difference would take
+/// away more than there is. The weights go by the guide alone, so noise of mean 0 adds nothing on average.
 pub fn smoothed(noisy: &Rgba32FImage, guide: &Rgba32FImage) -> Rgba32FImage {
-    let opacity: Vec<f64> = guide.pixels().map(|p| f64::from(1.0 - p.0[3]).max(0.0)).collect();
     let width = guide.width() as usize;
-    let spread = blur(&opacity, width);
-    let channels: [Vec<f64>; 4] = std::array::from_fn(|i| {
-        let apart = noisy.pixels().zip(guide.pixels()).zip(&opacity);
-        // The noise where there is no cloud in the guide is no one's.
-        let apart: Vec<f64> =
-            apart.map(|((n, g), w)| if *w > 0.0 { f64::from(n.0[i]) - f64::from(g.0[i]) } else { 0.0 }).collect();
-        blur(&apart, width)
+    let light: [Vec<f64>; 3] = std::array::from_fn(|i| {
+        let guides = channel(guide, i);
+        let cloud = guides.iter().filter(|g| **g > 0.0).count().max(1);
+        let dark = DARK * guides.iter().sum::<f64>() / cloud as f64;
+        let even = |values: &[f64]| {
+            let even: Vec<f64> =
+                values.iter().zip(&guides).map(|(v, g)| if *g > 0.0 { v / (g + dark) } else { 0.0 }).collect();
+            blur(&even, width)
+        };
+        let (of_noisy, of_guide) = (even(&channel(noisy, i)), even(&guides));
+        guides.iter().zip(of_noisy.iter().zip(of_guide)).map(|(g, (n, of))| g * (n / of.max(1e-9)).max(0.0)).collect()
     });
+    let clear = channel(guide, 3);
+    let opacity: Vec<f64> = clear.iter().map(|t| (1.0 - t).max(0.0)).collect();
+    // The noise where there is no cloud in the guide is no one's.
+    let apart: Vec<f64> = channel(noisy, 3)
+        .iter()
+        .zip(clear.iter().zip(&opacity))
+        .map(|(n, (g, w))| if *w > 0.0 { n - g } else { 0.0 })
+        .collect();
+    let (apart, spread) = (blur(&apart, width), blur(&opacity, width));
     let mut out = guide.clone();
     for (k, pixel) in out.pixels_mut().enumerate() {
-        let share = opacity[k] / spread[k].max(1e-6);
-        let value = |i: usize| (f64::from(pixel.0[i]) + share * channels[i][k]).max(0.0);
-        *pixel = Rgba(std::array::from_fn(|i| if i == 3 { value(i).min(1.0) } else { value(i) } as f32));
+        let transmittance = clear[k] + opacity[k] / spread[k].max(1e-6) * apart[k];
+        let [r, g, b] = [light[0][k], light[1][k], light[2][k]];
+        *pixel = Rgba([r, g, b, transmittance.clamp(0.0, 1.0)].map(|v| v as f32));
     }
     out
+}
+
+fn channel(picture: &Rgba32FImage, i: usize) -> Vec<f64> {
+    picture.pixels().map(|p| f64::from(p.0[i])).collect()
 }
 
 /// A Gaussian over rows of `width`; what would reach beyond the picture is left out of the mean.
@@ -87,6 +109,25 @@ mod tests {
                 assert_eq!(found.0, [0.0, 0.0, 0.0, 1.0], "clear sky at {x}, {y}");
             }
         }
+    }
+
+    #[test]
+    fn dark_cloud_beside_bright_stays_lit() {
+        // Next to the sun: three bright pixels in dark cloud. The truth has half of the bright light, and 1.2 of the dark.
+        let of = |bright: f32, dark: f32| {
+            Rgba32FImage::from_fn(24, 16, |x, _| {
+                let light = if (8..11).contains(&x) { bright } else { dark };
+                Rgba([light, light, light, 0.1])
+            })
+        };
+        let (guide, truth) = (of(1e5, 1e3), of(5e4, 1.2e3));
+        let found = smoothed(&truth, &guide);
+        for ((x, y, found), truth) in found.enumerate_pixels().zip(truth.pixels()) {
+            let ratio = found.0[0] / truth.0[0];
+            // Where the two meet their ratios mix; a smoothed difference would leave the dark none of its light.
+            assert!((0.4..2.0).contains(&ratio), "{x}, {y}: {ratio} of the truth");
+        }
+        assert!(found.pixels().all(|p| (p.0[3] - 0.1).abs() < 1e-6), "transmittance was right");
     }
 
     #[test]

@@ -43,9 +43,10 @@ and B of independent samples: `(x − A)(x − B)` has the mean `(x − truth)²
 and T error on average (a small one may come out slightly negative).
 
 FLIP compares pictures as shown, and tone mapping bends: a noisy picture is shown too dark, in the colour of its most frequent
-samples. For FLIP the halves are therefore averaged as light, before tone mapping, and over some 50 pixels: the difference
-from our converged march, per opacity, is smoothed (a Gaussian of RADIUS pixels) and added to the march again. What march and
-reference differ in within a few pixels is thus not in FLIP, but in relMSE and T error, which go by the halves as they are.
+samples. For FLIP the halves are therefore averaged as light, before tone mapping, and over some 50 pixels: what their light is
+as a share of our converged march's, and what their transmittance differs by per opacity, is averaged over a Gaussian of
+RADIUS pixels, and the march is changed by it. What march and reference differ in within a few pixels is thus not in FLIP, but in
+relMSE and T error, which go by the halves as they are.
 Before the sky, clouds are then shown by this tool, exposed and tone-mapped as Bevy does it; so is every picture that is
 compared. The noise floor below is FLIP between the two halves so treated: a perfect picture would score about half of it, and
 less of it is left beside a larger error, since the two add like squares.
