@@ -15,7 +15,7 @@ use bevy::{
         Atmosphere, AtmosphereEnvironmentMapLight, CascadeShadowConfigBuilder, SunDisk, atmosphere::ScatteringMedium,
         light_consts::lux,
     },
-    pbr::AtmosphereSettings,
+    pbr::{AtmosphereMode, AtmosphereSettings},
     prelude::*,
 };
 use bevy_cumulus::{prelude::*, reference::planet::PLANET_RADIUS};
@@ -110,9 +110,16 @@ const SCENES: [Scene; 12] = [
         sun: SunPose::new(30.0, 60.0),
         ..EVERYDAY
     },
-    Scene { name: "orbit", camera: CameraPose::new(0.0, 400_000.0, 0.0, 0.0, -50.0), ..EVERYDAY },
+    Scene {
+        name: "orbit",
+        preset: "WeatherSystems",
+        camera: CameraPose::new(0.0, 400_000.0, 0.0, 0.0, -50.0),
+        sun: SunPose::new(45.0, 60.0),
+        ..EVERYDAY
+    },
     Scene {
         name: "limb",
+        preset: "WeatherSystems",
         camera: CameraPose::new(0.0, 400_000.0, 0.0, 0.0, -19.0),
         sun: SunPose::new(40.0, 60.0),
         ..EVERYDAY
@@ -314,15 +321,27 @@ pub fn camera(ev100: f32) -> impl Bundle {
     (Camera3d::default(), Hdr, Exposure { ev100 }, Tonemapping::AcesFitted)
 }
 
-/// How far Bevy's table of the air before things has to reach (m) at this altitude (m): to the horizon, beyond which the
-/// ground would show too dark, or where that is near as far as clouds are seen.
-pub fn air_reach(altitude: f32) -> f32 {
+/// Altitude from which Bevy's atmosphere is marched (m): most of the air lies below.
+const MARCHED_FROM: f32 = 25_000.0;
+
+/// Bevy's atmosphere for a camera at this altitude (m).
+///
+/// Its table of the air before things has to reach to the horizon, beyond which the ground would show too dark, or where that
+/// is near as far as clouds are seen. From far above the tables hold nothing, and Bevy has to march.
+pub fn air(altitude: f32) -> AtmosphereSettings {
     let horizon = (2.0 * PLANET_RADIUS as f32 * altitude.max(0.0)).sqrt();
-    (1.1 * horizon).clamp(100_000.0, 400_000.0)
+    let rendering_method =
+        if altitude < MARCHED_FROM { AtmosphereMode::LookupTexture } else { AtmosphereMode::Raymarched };
+    AtmosphereSettings {
+        aerial_view_lut_max_distance: (1.1 * horizon).clamp(100_000.0, 400_000.0),
+        rendering_method,
+        sky_max_samples: 32,
+        ..default()
+    }
 }
 
 /// The parts of a camera that need Bevy's atmosphere, at this altitude (m).
 pub fn sky_camera(altitude: f32) -> impl Bundle {
-    let settings = AtmosphereSettings { aerial_view_lut_max_distance: air_reach(altitude), ..default() };
+    let settings = air(altitude);
     (settings, AtmosphereEnvironmentMapLight::default())
 }

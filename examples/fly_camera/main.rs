@@ -17,6 +17,7 @@ use bevy::{
     camera_controller::free_camera::{FreeCamera, FreeCameraPlugin, FreeCameraState},
     diagnostic::FrameTimeDiagnosticsPlugin,
     input::InputSystems,
+    pbr::AtmosphereSettings,
     prelude::*,
     render::diagnostic::RenderDiagnosticsPlugin,
 };
@@ -94,7 +95,7 @@ fn fly(options: &Options) -> Result<AppExit> {
         .add_systems(Startup, setup)
         .add_systems(PreUpdate, share_input.after(InputSystems))
         .add_systems(Update, (keys::sky, keys::clock, keys::screen).run_if(keys::free))
-        .add_systems(Update, (watch::follow, take_preset_sun, move_sun).chain().after(keys::sky))
+        .add_systems(Update, ((watch::follow, take_preset_sun, move_sun).chain().after(keys::sky), match_air))
         .add_systems(EguiPrimaryContextPass, overlay::show);
     if let Some(watched) = watched {
         app.insert_resource(watched);
@@ -133,6 +134,13 @@ fn setup(world: &mut World) {
     let camera = world.spawn((common::camera(ev100), view, Msaa::Off, flying, pose)).id();
     if start.sky {
         world.entity_mut(camera).insert(common::sky_camera(start.camera.position.y));
+    }
+}
+
+/// Bevy's atmosphere has to be told from where it is seen.
+fn match_air(mut cameras: Query<(&Transform, &mut AtmosphereSettings)>) {
+    for (place, mut air) in &mut cameras {
+        *air = common::air(place.translation.y);
     }
 }
 

@@ -321,7 +321,7 @@ impl Studio {
                 exposure.ev100 = plan.ev100;
             }
             if let Some(mut air) = self.app.world_mut().get_mut::<AtmosphereSettings>(camera) {
-                air.aerial_view_lut_max_distance = common::air_reach(plan.camera(0).position.y);
+                *air = common::air(plan.camera(0).position.y);
             }
         }
     }

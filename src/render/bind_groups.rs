@@ -2,7 +2,7 @@
 
 use bevy::{
     pbr::{
-        GpuAtmosphereSettings,
+        ExtractedAtmosphere, GpuAtmosphereSettings, GpuScatteringMedium, ScatteringMediumSampler,
         resources::{
             AtmosphereSampler, AtmosphereTextures, AtmosphereTransforms, AtmosphereTransformsOffset, GpuAtmosphere,
         },
@@ -58,6 +58,7 @@ pub(crate) struct SkyLightBuffer(Buffer);
 
 /// Bevy's atmosphere on a view.
 type Air = (
+    &'static ExtractedAtmosphere,
     &'static AtmosphereTextures,
     &'static DynamicUniformIndex<GpuAtmosphere>,
     &'static DynamicUniformIndex<GpuAtmosphereSettings>,
@@ -84,6 +85,8 @@ pub(crate) struct AirResources<'w> {
     atmospheres: Option<Res<'w, ComponentUniforms<GpuAtmosphere>>>,
     settings: Option<Res<'w, ComponentUniforms<GpuAtmosphereSettings>>>,
     transforms: Option<Res<'w, AtmosphereTransforms>>,
+    media: Option<Res<'w, RenderAssets<GpuScatteringMedium>>>,
+    medium_sampler: Option<Res<'w, ScatteringMediumSampler>>,
 }
 
 impl AirResources<'_> {
@@ -91,21 +94,30 @@ impl AirResources<'_> {
         &self,
         device: &RenderDevice,
         layout: &BindGroupLayout,
+        air_marched: bool,
+        atmosphere: &ExtractedAtmosphere,
         textures: &AtmosphereTextures,
     ) -> Option<BindGroup> {
-        Some(device.create_bind_group(
-            "cloud_air",
-            layout,
-            &BindGroupEntries::with_indices((
-                (0, self.atmospheres.as_ref()?.binding()?),
-                (1, self.settings.as_ref()?.binding()?),
-                (2, self.transforms.as_ref()?.uniforms().binding()?),
-                (8, &textures.transmittance_lut.default_view),
-                (10, &textures.sky_view_lut.default_view),
-                (11, &textures.aerial_view_lut.default_view),
-                (12, &***self.sampler.as_ref()?),
-            )),
+        let mut entries = BindGroupEntries::with_indices((
+            (0, self.atmospheres.as_ref()?.binding()?),
+            (1, self.settings.as_ref()?.binding()?),
+            (2, self.transforms.as_ref()?.uniforms().binding()?),
+            (8, &textures.transmittance_lut.default_view),
+            (10, &textures.sky_view_lut.default_view),
+            (11, &textures.aerial_view_lut.default_view),
+            (12, &***self.sampler.as_ref()?),
         ))
+        .to_vec();
+        if air_marched {
+            let medium = self.media.as_ref()?.get(atmosphere.medium)?;
+            entries.extend_from_slice(&BindGroupEntries::with_indices((
+                (5, &medium.density_lut_view),
+                (6, &medium.scattering_lut_view),
+                (7, self.medium_sampler.as_ref()?.sampler()),
+                (9, &textures.multiscattering_lut.default_view),
+            )));
+        }
+        Some(device.create_bind_group("cloud_air", layout, &entries))
     }
 }
 
@@ -181,9 +193,10 @@ fn view_bind_groups(
 ) -> Option<CloudBindGroups> {
     let depth = item.depth.attachment.depth_stencil_views().depth_only_view()?;
     let layout = |d: &BindGroupLayoutDescriptor| cache.get_bind_group_layout(d);
-    let air = item.air.as_ref().and_then(|(textures, atmosphere, settings, transform)| {
-        let group = air_resources.bind_group(device, &layout(&pipelines.air), textures)?;
-        Some((group, vec![atmosphere.index(), settings.index(), transform.index()]))
+    let air = item.air.as_ref().and_then(|(atmosphere, textures, index, settings, transform)| {
+        let group =
+            air_resources.bind_group(device, &layout(&pipelines.air), pipelines.air_marched, atmosphere, textures)?;
+        Some((group, vec![index.index(), settings.index(), transform.index()]))
     });
     let multisampled = *item.msaa != Msaa::Off;
     let ms = usize::from(multisampled);

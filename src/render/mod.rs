@@ -64,6 +64,7 @@ impl Plugin for CloudRenderPlugin {
         load_shader_library!(app, "composite/fine.wesl");
         load_shader_library!(app, "composite/pixel.wesl");
         load_shader_library!(app, "sky/sky.wesl");
+        load_shader_library!(app, "sky/air.wesl");
         embedded_asset!(app, "march/march.wesl");
         embedded_asset!(app, "accumulate/accumulate.wesl");
         embedded_asset!(app, "accumulate/blend.wesl");

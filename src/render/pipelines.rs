@@ -11,7 +11,10 @@ use bevy::{
     },
     platform::collections::HashMap,
     prelude::*,
-    render::render_resource::{binding_types::*, *},
+    render::{
+        render_resource::{binding_types::*, *},
+        renderer::RenderDevice,
+    },
 };
 
 use super::{frame::FrameUniform, phase_slots::phase_tables_layout, reproject::HeldUniform};
@@ -40,9 +43,10 @@ pub(crate) struct Variant {
 
 impl Variant {
     /// What its shaders are compiled with.
-    fn definitions(self) -> Vec<bevy::shader::ShaderDefVal> {
+    fn definitions(self, air_marched: bool) -> Vec<bevy::shader::ShaderDefVal> {
         let all = [
             ("ATMOSPHERE", self.atmosphere),
+            ("AIR_MARCHED", self.atmosphere && air_marched),
             ("MULTISAMPLED", self.multisampled),
             ("DEBUG_VIEW", self.debug != DebugShader::None),
             ("DEBUG_MAP", self.debug == DebugShader::Map),
@@ -73,6 +77,8 @@ pub(crate) struct Pipelines {
 pub(crate) struct CloudPipelines {
     pub empty: BindGroupLayoutDescriptor,
     pub air: BindGroupLayoutDescriptor,
+    /// Whether the device has textures enough for air to be marched (see air.wesl).
+    pub air_marched: bool,
     pub sky: BindGroupLayoutDescriptor,
     pub march: [BindGroupLayoutDescriptor; 2],
     pub accumulate: BindGroupLayoutDescriptor,
@@ -88,6 +94,9 @@ pub(crate) struct CloudPipelines {
 
 /// Bytes of `SkyLight` in `sky.wesl`.
 pub(crate) const SKY_LIGHT_BYTES: u64 = 32;
+
+/// Textures that the march reads where air is marched: more than WebGPU promises.
+const TEXTURES_WITH_AIR: u32 = 18;
 
 pub(crate) fn depth_layout(multisampled: bool) -> BindGroupLayoutEntryBuilder {
     if multisampled { texture_depth_2d_multisampled() } else { texture_depth_2d() }
@@ -163,26 +172,39 @@ impl FromWorld for CloudPipelines {
                 ),
             )
         };
+        // Binding numbers are Bevy's, so that its atmosphere's own functions can be imported.
+        let mut air = BindGroupLayoutEntries::with_indices(
+            compute,
+            (
+                (0, uniform_buffer::<GpuAtmosphere>(true)),
+                (1, uniform_buffer::<GpuAtmosphereSettings>(true)),
+                (2, uniform_buffer::<AtmosphereTransform>(true)),
+                (8, texture_2d(filtered)),
+                (10, texture_2d(filtered)),
+                (11, texture_3d(filtered)),
+                (12, sampler(SamplerBindingType::Filtering)),
+            ),
+        )
+        .to_vec();
+        let limits = world.resource::<RenderDevice>().limits();
+        let air_marched = limits.max_sampled_textures_per_shader_stage >= TEXTURES_WITH_AIR;
+        if air_marched {
+            air.extend_from_slice(&BindGroupLayoutEntries::with_indices(
+                compute,
+                (
+                    (5, texture_2d(filtered)),
+                    (6, texture_2d(filtered)),
+                    (7, sampler(SamplerBindingType::Filtering)),
+                    (9, texture_2d(filtered)),
+                ),
+            ));
+        }
         let composite = |multisampled| full_size("cloud_composite", multisampled, TextureFormat::Rgba16Float);
         let publish = |multisampled| full_size("cloud_publish", multisampled, TextureFormat::Rgba32Float);
         Self {
             empty: BindGroupLayoutDescriptor::new("cloud_empty", &[]),
-            // Binding numbers are Bevy's, so that its atmosphere's own functions can be imported.
-            air: BindGroupLayoutDescriptor::new(
-                "cloud_air",
-                &BindGroupLayoutEntries::with_indices(
-                    compute,
-                    (
-                        (0, uniform_buffer::<GpuAtmosphere>(true)),
-                        (1, uniform_buffer::<GpuAtmosphereSettings>(true)),
-                        (2, uniform_buffer::<AtmosphereTransform>(true)),
-                        (8, texture_2d(filtered)),
-                        (10, texture_2d(filtered)),
-                        (11, texture_3d(filtered)),
-                        (12, sampler(SamplerBindingType::Filtering)),
-                    ),
-                ),
-            ),
+            air: BindGroupLayoutDescriptor::new("cloud_air", &air),
+            air_marched,
             sky: BindGroupLayoutDescriptor::new(
                 "cloud_sky",
                 &BindGroupLayoutEntries::sequential(
@@ -238,7 +260,7 @@ impl CloudPipelines {
         // A debug view shares all but the march with the normal variant, and the path tracer all that comes after it.
         let plain = (variant.debug != DebugShader::None || variant.path_traced)
             .then(|| self.get(cache, model, Variant { debug: DebugShader::None, path_traced: false, ..variant }));
-        let defs = variant.definitions();
+        let defs = variant.definitions(self.air_marched);
         let ms = usize::from(variant.multisampled);
         let air = if variant.atmosphere { &self.air } else { &self.empty };
         let compute_with = |label: &'static str, shader: &Handle<Shader>, layout: [&BindGroupLayoutDescriptor; 3]| {

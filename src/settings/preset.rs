@@ -32,7 +32,7 @@ const LOWEST_SUN: f32 = -90.0;
 const HIGHEST_SUN: f32 = 90.0;
 
 /// Names and texts of the presets that come with the crate.
-const BUILT_IN: [(&str, &str); 22] = [
+const BUILT_IN: [(&str, &str); 23] = [
     ("ClearDay", include_str!("../../assets/presets/clear_day.clouds.ron")),
     ("FairWeather", include_str!("../../assets/presets/fair_weather.clouds.ron")),
     ("Overcast", include_str!("../../assets/presets/overcast.clouds.ron")),
@@ -55,6 +55,7 @@ const BUILT_IN: [(&str, &str); 22] = [
     ("MackerelSky", include_str!("../../assets/presets/mackerel_sky.clouds.ron")),
     ("RedSunset", include_str!("../../assets/presets/red_sunset.clouds.ron")),
     ("AfterRain", include_str!("../../assets/presets/after_rain.clouds.ron")),
+    ("WeatherSystems", include_str!("../../assets/presets/weather_systems.clouds.ron")),
 ];
 
 impl CloudPreset {

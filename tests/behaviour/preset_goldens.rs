@@ -23,7 +23,7 @@ use crate::{
 /// The mean transmittance, least and most, of each preset's clouds as seen from the ground: wide enough for a preset to be
 /// retuned, and too narrow for a sky that is empty, or closed by what is no deck: then it would be 1, or 0.25, since a quarter
 /// of the view is ground.
-const FROM_THE_GROUND: [(&str, [f32; 2]); 22] = [
+const FROM_THE_GROUND: [(&str, [f32; 2]); 23] = [
     ("ClearDay", [0.6, 0.998]),
     ("FairWeather", [0.4, 0.95]),
     ("Overcast", [0.2, 0.45]),
@@ -46,10 +46,15 @@ const FROM_THE_GROUND: [(&str, [f32; 2]); 22] = [
     ("MackerelSky", [0.27, 0.8]),
     ("RedSunset", [0.27, 0.9]),
     ("AfterRain", [0.27, 0.9]),
+    ("WeatherSystems", [0.2, 0.9]),
 ];
 /// The same from above (no ground is near: 0 would be closed), of skies that are tall or high.
-const FROM_ABOVE: [(&str, [f32; 2]); 3] =
-    [("Cumulonimbus", [0.2, 0.97]), ("Cirrus", [0.6, 0.998]), ("Storm", [0.05, 0.8])];
+const FROM_ABOVE: [(&str, [f32; 2]); 4] = [
+    ("Cumulonimbus", [0.2, 0.97]),
+    ("Cirrus", [0.6, 0.998]),
+    ("Storm", [0.05, 0.8]),
+    ("WeatherSystems", [0.2, 0.97]),
+];
 /// Over all of them.
 const ABOVE: &str = "0,14000,0,0,-20";
 
