@@ -2,6 +2,7 @@
 //! where there is none.
 
 mod adding;
+mod air;
 mod bad_input;
 mod bound;
 mod cameras;
