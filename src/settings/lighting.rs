@@ -86,7 +86,8 @@ pub struct CloudLighting {
     /// Powder term `1 − e^(−2τ)` (Costa, 2.20), an artist's darkening of sunlit edges (0 off, 1 full). Default 0.
     #[reflect(@0.0..=1.0_f32)]
     pub powder: f32,
-    /// Amount of aerial perspective between camera and cloud, with Bevy's atmosphere only (0..1). Default 1.
+    /// Amount of aerial perspective between camera and cloud, with Bevy's atmosphere only (0..1): by its tables, above 15 to
+    /// 25 km of altitude and with `AtmosphereMode::Raymarched` by a march of 12 steps a ray. Default 1.
     #[reflect(@0.0..=1.0_f32)]
     pub aerial_perspective: f32,
     /// Where the blend with the background begins, as a share of the distance at which a cloud ends:

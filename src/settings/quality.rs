@@ -130,7 +130,7 @@ pub struct CloudQuality {
     pub max_steps: u32,
     /// Samples towards the sun for each lit sample (0: the sun is never shadowed). Cost is linear in it. They shrink to fit
     /// the way through the clouds where it is shorter; where it is longer, as under a low sun, one more is taken for each
-    /// 1.2 km, up to 30 km.
+    /// 500 m, up to 30 km.
     /// Default 6.
     #[reflect(@0..=64_u32)]
     pub light_steps: u32,
