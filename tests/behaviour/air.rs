@@ -64,7 +64,10 @@ fn marched_air_is_what_bevys_table_holds() {
         });
         println!("from {altitude} m: {table} in the table, {marched} marched");
         assert!(table.min_element() > 10.0, "there is no air: {table}");
-        assert!((marched / table - 1.0).abs().max_element() < 0.1, "from {altitude} m: {marched}, {table} in the table");
+        assert!(
+            (marched / table - 1.0).abs().max_element() < 0.1,
+            "from {altitude} m: {marched}, {table} in the table"
+        );
     }
 }
 

@@ -222,7 +222,8 @@ fn rain_hangs_from_the_tower_and_not_from_the_anvil() {
         let questions: Vec<Question> = places.iter().map(|m| at(Vec3::new(m.x, height, m.y), 0.0)).collect();
         ask(&mut app, &model, &questions).iter().map(|answer| answer[1]).collect()
     };
-    let (anvil, tower, rain) = (density(base + 0.78 * thickness), density(base + 0.3 * thickness), density(base - 40.0));
+    let (anvil, tower, rain) =
+        (density(base + 0.78 * thickness), density(base + 0.3 * thickness), density(base - 40.0));
     let (mut overhung, mut wet) = (0, 0);
     for ((anvil, tower), rain) in anvil.iter().zip(&tower).zip(&rain) {
         overhung += u32::from(*anvil > 0.1 && *tower == 0.0);

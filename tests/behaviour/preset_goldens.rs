@@ -49,12 +49,8 @@ const FROM_THE_GROUND: [(&str, [f32; 2]); 23] = [
     ("WeatherSystems", [0.2, 0.9]),
 ];
 /// The same from above (no ground is near: 0 would be closed), of skies that are tall or high.
-const FROM_ABOVE: [(&str, [f32; 2]); 4] = [
-    ("Cumulonimbus", [0.2, 0.97]),
-    ("Cirrus", [0.6, 0.998]),
-    ("Storm", [0.05, 0.8]),
-    ("WeatherSystems", [0.2, 0.97]),
-];
+const FROM_ABOVE: [(&str, [f32; 2]); 4] =
+    [("Cumulonimbus", [0.2, 0.97]), ("Cirrus", [0.6, 0.998]), ("Storm", [0.05, 0.8]), ("WeatherSystems", [0.2, 0.97])];
 /// Over all of them.
 const ABOVE: &str = "0,14000,0,0,-20";
 
