@@ -65,6 +65,8 @@ impl Plugin for CloudRenderPlugin {
         load_shader_library!(app, "composite/pixel.wesl");
         load_shader_library!(app, "sky/sky.wesl");
         load_shader_library!(app, "sky/air.wesl");
+        load_shader_library!(app, "sky/over.wesl");
+        load_shader_library!(app, "sky/sun.wesl");
         embedded_asset!(app, "march/march.wesl");
         embedded_asset!(app, "accumulate/accumulate.wesl");
         embedded_asset!(app, "accumulate/blend.wesl");
