@@ -382,7 +382,8 @@ fn in_the_planet_every_mode_is_finite_and_comes_back() {
         app.world_mut().entity_mut(view.camera).insert(placed);
     };
     for mode in all() {
-        let quality = CloudQuality { resolution: MarchResolution::Full, step: 200.0, ..CloudQuality::high() };
+        let quality =
+            CloudQuality { resolution: MarchResolution::Full, step: 200.0, window: 8, ..CloudQuality::high() };
         app.insert_resource(in_mode(mode, quality));
         place(&mut app, 10.0, 35.0);
         run_updates(&mut app, FRAMES);

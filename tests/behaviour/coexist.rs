@@ -22,7 +22,12 @@ const ORDERS: [CloudOrder; 2] = [CloudOrder::Sorted, CloudOrder::AfterTransparen
 /// The built-in clouds, a camera with an effect, and one without.
 fn pair(effect: impl Bundle) -> (App, [View; 2]) {
     let mut app = clouds_app();
-    app.insert_resource(CloudQuality { resolution: MarchResolution::Full, step: 200.0, ..CloudQuality::high() });
+    app.insert_resource(CloudQuality {
+        resolution: MarchResolution::Full,
+        step: 200.0,
+        window: 8,
+        ..CloudQuality::high()
+    });
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let views = [0, 1].map(|_| spawn_linear(&mut app, SIZE, Transform::default()));
     app.world_mut().entity_mut(views[0].camera).insert(effect);
@@ -159,7 +164,8 @@ fn a_scene_drawn_small_keeps_its_history_and_starts_over_at_another_size() {
     until_drawn(&mut app);
     settle(&mut app);
     for mode in HELD {
-        let quality = CloudQuality { resolution: MarchResolution::Full, step: 200.0, ..CloudQuality::high() };
+        let quality =
+            CloudQuality { resolution: MarchResolution::Full, step: 200.0, window: 8, ..CloudQuality::high() };
         app.insert_resource(in_mode(mode, quality));
         let mut k = 0;
         for (size, alone) in sizes.into_iter().zip(&alone) {

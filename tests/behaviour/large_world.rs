@@ -26,7 +26,14 @@ fn world_under(temporal: TemporalMode, sky: Sky) -> World {
     let mut app = clouds_app();
     app.insert_resource(CloudModel { wind: Vec3::new(WIND, 0.0, 0.0), evolution: 0.0, ..default() });
     let resolution = MarchResolution::Full;
-    app.insert_resource(CloudQuality { temporal, resolution, step: 160.0, light_steps: 3, ..CloudQuality::high() });
+    app.insert_resource(CloudQuality {
+        temporal,
+        resolution,
+        step: 160.0,
+        light_steps: 3,
+        window: 8,
+        ..CloudQuality::high()
+    });
     let sun = spawn_sun(&mut app, LIGHT);
     let view = spawn_view(&mut app, SIZE, Transform::default(), sky);
     until_drawn(&mut app);

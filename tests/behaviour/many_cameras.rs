@@ -25,7 +25,12 @@ fn looking(yaw: f32) -> Transform {
 fn noisy_app() -> App {
     let mut app = clouds_app();
     app.insert_resource(CloudModel { wind: Vec3::new(20.0, 0.0, 0.0), coverage: 0.3, ..default() });
-    app.insert_resource(CloudQuality { resolution: MarchResolution::Full, step: 200.0, ..CloudQuality::high() });
+    app.insert_resource(CloudQuality {
+        resolution: MarchResolution::Full,
+        step: 200.0,
+        window: 8,
+        ..CloudQuality::high()
+    });
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     app
 }
@@ -108,7 +113,8 @@ fn a_view_that_cannot_be_drawn_costs_the_others_no_history() {
         .to_owned(),
     );
     let mut app = clouds_app_with((move |app: &mut App| _ = app.insert_resource(lumps.clone()), CloudsPlugin));
-    let quality = CloudQuality { resolution: MarchResolution::Full, step: 200.0, light_steps: 2, ..default() };
+    let quality =
+        CloudQuality { resolution: MarchResolution::Full, step: 200.0, light_steps: 2, window: 8, ..default() };
     app.insert_resource(quality.clone());
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let view = spawn_view(&mut app, SIZE, looking(0.0), Sky::Black);

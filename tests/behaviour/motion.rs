@@ -2,6 +2,7 @@
 
 mod crossing;
 mod finer;
+mod flown_through;
 mod uncovered;
 
 use bevy::{camera::Exposure, prelude::*};
@@ -22,7 +23,10 @@ type Picture = Vec<Vec4>;
 
 fn quality(mode: Mode) -> CloudQuality {
     let resolution = MarchResolution::Full;
-    in_mode(mode, CloudQuality { resolution, step: 160.0, step_growth: 0.012, light_steps: 3, ..CloudQuality::high() })
+    in_mode(
+        mode,
+        CloudQuality { resolution, step: 160.0, step_growth: 0.012, light_steps: 3, window: 8, ..CloudQuality::high() },
+    )
 }
 
 /// So many frames that nothing is left of noise.

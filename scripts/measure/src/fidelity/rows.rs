@@ -61,7 +61,7 @@ const ALONE: [Change; 27] = [
     ("light_6", "6 light steps (Low's to High's)", &LIGHT_HIGH),
     ("light_16", "16 light steps (Ultra's)", &LIGHT_ULTRA),
     ("step_140", "step 140 m (Low's)", &["quality.step=140", "quality.step_growth=0.014"]),
-    ("step_90", "step 90 m (High's)", &["quality.step=90", "quality.step_growth=0.008"]),
+    ("step_100", "step 100 m (High's)", &["quality.step=100", "quality.step_growth=0.009"]),
     ("step_60", "step 60 m (Ultra's)", &["quality.step=60", "quality.step_growth=0.006"]),
     ("half", "half resolution", &["quality.resolution=half"]),
     ("quarter", "quarter resolution", &["quality.resolution=quarter"]),
@@ -84,7 +84,7 @@ const UPSCALE: [&str; 3] = ["quality.resolution=full", "quality.temporal=upscale
 /// Changes of the default preset: there a window does more than where steps are short.
 const FROM_HIGH: [Change; 8] = [
     ("high_window_1", "High, 1 frame", &["quality.temporal=off"]),
-    ("high_window_16", "High, 16 frames", &["quality.window=16"]),
+    ("high_window_8", "High, 8 frames", &["quality.window=8"]),
     ("high_full", "High, full resolution", &["quality.resolution=full"]),
     ("high_quarter", "High, quarter resolution", &["quality.resolution=quarter"]),
     ("high_upscale", "High, full resolution, a quarter of it a frame", &UPSCALE),

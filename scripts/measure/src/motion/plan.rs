@@ -100,7 +100,7 @@ pub struct Mode {
 pub const MODES: [Mode; 5] = [
     // As many as its time is measured by: it has no memory.
     Mode { name: "Off", options: "--set quality.temporal=off", memory: 4 },
-    Mode { name: "SlidingWindow(8)", options: "--set quality.temporal=sliding_window", memory: 12 },
+    Mode { name: "SlidingWindow(16)", options: "--set quality.temporal=sliding_window", memory: 20 },
     Mode { name: "Exponential(0.05)", options: "--set quality.temporal=exponential", memory: 48 },
     // The mean of eight samples, of which each texel has one in four frames, or in sixteen.
     Mode { name: "Upscale 2×2", options: "--set quality.temporal=upscale --set quality.block=two", memory: 40 },
