@@ -18,9 +18,9 @@ const LOOK: f32 = 30.0;
 const STEP: f32 = 10.0 / 3.0;
 const FRAMES: u32 = 24;
 
-/// Errors at most. Were nothing to fade, they would be .081, .115, .152 and .201 (and with it .078, .082, .115, .104): the
+/// Errors at most. Were nothing to fade, they would be .081, .115, .152 and .201 (and with it .079, .077, .099, .114): the
 /// window has left the cloud behind by then in any case.
-const MOST: [f32; 4] = [0.1, 0.1, 0.135, 0.15];
+const MOST: [f32; 4] = [0.1, 0.095, 0.125, 0.15];
 
 fn mean_transmittance(app: &App, view: &View) -> f32 {
     let pixels = cloud_pixels(app, view);

@@ -8,8 +8,9 @@ use super::{
 };
 use crate::{engine::Job, metrics::Truth, sheet};
 
-/// The converged still: as many frames as a window holds.
-const CONVERGED: &str = "--set quality.temporal=sliding_window --set quality.window=16";
+/// The converged still: as many frames as a window holds, of half the steps of the default, which holds as many.
+const CONVERGED: &str = "--set quality.temporal=sliding_window --set quality.window=16 --set quality.step=50 \
+                         --set quality.step_growth=0.0045";
 const CONVERGED_AFTER: u32 = 16;
 
 /// One mode at one instant: FLIP to the converged still, over the cloud.

@@ -19,7 +19,7 @@ a picture that hardly changes flickers, and what it costs. Written by `scripts/m
 const COLUMNS: &str = "
 | Column | Meaning |
 |---|---|
-| at rest | FLIP to a converged still (window of 16), over the cloud: the same mode, nothing moving. Mean over the instants judged |
+| at rest | FLIP to a converged still (window of 16, steps half as long), over the cloud: the same mode, nothing moving. Mean over the instants judged |
 | moving | the same of a frame in motion, against a converged still of its instant |
 | above rest | the difference: what the motion costs |
 | worst | the same at the instant where it is greatest. Bold where it is over the target |
