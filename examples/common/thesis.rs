@@ -62,7 +62,7 @@ pub const FIGURES: [Scene; 18] = [
     near("thesis_integration_naive", &[FULL, STEP_80, LEVEL, ("quality.integration", "naive")]),
     near("thesis_integration", &[FULL, STEP_80, LEVEL]),
     near("thesis_window_8m", &[FULL, ("quality.step", "8"), LEVEL, ALONE, CENTRED, MANY]),
-    near("thesis_window_80m", &[FULL, STEP_80, LEVEL, MANY]),
+    near("thesis_window_80m", &[FULL, STEP_80, LEVEL, MANY, ("quality.window", "8")]),
 ];
 
 const STEP_80: Setting = ("quality.step", "80");
