@@ -17,7 +17,7 @@ use bevy_cumulus::{CloudFrame, prelude::*, settings::SettingsError, settings::Va
 use crate::{
     gpu::{headless_plugins, run_until, run_updates, times_logged},
     modes::{HELD, all, in_mode},
-    stage::{CLEAR, exact, linear_pixels, render_components, settle, slab_app, spawn_linear},
+    stage::{CLEAR, exact, linear_pixels, noisy, render_components, settle, slab_app, spawn_linear},
     view::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
 };
 
@@ -382,9 +382,7 @@ fn in_the_planet_every_mode_is_finite_and_comes_back() {
         app.world_mut().entity_mut(view.camera).insert(placed);
     };
     for mode in all() {
-        let quality =
-            CloudQuality { resolution: MarchResolution::Full, step: 200.0, window: 8, ..CloudQuality::high() };
-        app.insert_resource(in_mode(mode, quality));
+        app.insert_resource(in_mode(mode, noisy()));
         place(&mut app, 10.0, 35.0);
         run_updates(&mut app, FRAMES);
         let before = cloud_pixels(&app, &view);

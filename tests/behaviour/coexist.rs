@@ -12,7 +12,7 @@ use bevy_cumulus::prelude::*;
 use crate::{
     gpu::run_updates,
     modes::{HELD, in_mode},
-    stage::{CLEAR, linear_pixels, settle, spawn_linear},
+    stage::{CLEAR, linear_pixels, noisy, settle, spawn_linear},
     view::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
 };
 
@@ -22,12 +22,7 @@ const ORDERS: [CloudOrder; 2] = [CloudOrder::Sorted, CloudOrder::AfterTransparen
 /// The built-in clouds, a camera with an effect, and one without.
 fn pair(effect: impl Bundle) -> (App, [View; 2]) {
     let mut app = clouds_app();
-    app.insert_resource(CloudQuality {
-        resolution: MarchResolution::Full,
-        step: 200.0,
-        window: 8,
-        ..CloudQuality::high()
-    });
+    app.insert_resource(noisy());
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let views = [0, 1].map(|_| spawn_linear(&mut app, SIZE, Transform::default()));
     app.world_mut().entity_mut(views[0].camera).insert(effect);
@@ -164,9 +159,7 @@ fn a_scene_drawn_small_keeps_its_history_and_starts_over_at_another_size() {
     until_drawn(&mut app);
     settle(&mut app);
     for mode in HELD {
-        let quality =
-            CloudQuality { resolution: MarchResolution::Full, step: 200.0, window: 8, ..CloudQuality::high() };
-        app.insert_resource(in_mode(mode, quality));
+        app.insert_resource(in_mode(mode, noisy()));
         let mut k = 0;
         for (size, alone) in sizes.into_iter().zip(&alone) {
             draw_small(&mut app, &whole, size);

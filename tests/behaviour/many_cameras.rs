@@ -9,7 +9,8 @@ use bevy_cumulus::{CloudsPlugin, ModelShader, prelude::*};
 use crate::{
     gpu::run_updates,
     stage::{
-        CLEAR, exact, greatest_difference, linear_pixels, render_components, settle, slab_app, spawn_box, spawn_linear,
+        CLEAR, exact, greatest_difference, linear_pixels, noisy, render_components, settle, slab_app, spawn_box,
+        spawn_linear,
     },
     view::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, shown_pixels, spawn_sun, spawn_view, until_drawn},
 };
@@ -25,12 +26,7 @@ fn looking(yaw: f32) -> Transform {
 fn noisy_app() -> App {
     let mut app = clouds_app();
     app.insert_resource(CloudModel { wind: Vec3::new(20.0, 0.0, 0.0), coverage: 0.3, ..default() });
-    app.insert_resource(CloudQuality {
-        resolution: MarchResolution::Full,
-        step: 200.0,
-        window: 8,
-        ..CloudQuality::high()
-    });
+    app.insert_resource(noisy());
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     app
 }
@@ -113,8 +109,7 @@ fn a_view_that_cannot_be_drawn_costs_the_others_no_history() {
         .to_owned(),
     );
     let mut app = clouds_app_with((move |app: &mut App| _ = app.insert_resource(lumps.clone()), CloudsPlugin));
-    let quality =
-        CloudQuality { resolution: MarchResolution::Full, step: 200.0, light_steps: 2, window: 8, ..default() };
+    let quality = CloudQuality { light_steps: 2, ..noisy() };
     app.insert_resource(quality.clone());
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let view = spawn_view(&mut app, SIZE, looking(0.0), Sky::Black);

@@ -61,6 +61,11 @@ pub fn exact(resolution: MarchResolution) -> CloudQuality {
     }
 }
 
+/// A quality of long steps, a ray a pixel and a window of eight frames, whose noise shows what is held.
+pub fn noisy() -> CloudQuality {
+    CloudQuality { resolution: MarchResolution::Full, step: 200.0, window: 8, ..CloudQuality::high() }
+}
+
 /// A camera with clouds over [`CLEAR`] whose target holds linear light as it is (`Rgba32Float`), without tone mapping.
 pub fn spawn_linear(app: &mut App, size: UVec2, transform: Transform) -> View {
     let mut view = spawn_view(app, size, transform, Sky::Black);
