@@ -118,8 +118,8 @@ fn due(mode: Mode) -> (usize, f32) {
         // As the mean of four frames.
         (TemporalMode::SlidingWindow | TemporalMode::Exponential, _) => (4, 0.5),
         // Each texel is marched once in four frames, or once in sixteen: no sooner can it be as right as a single frame.
-        (TemporalMode::Upscale, UpscaleBlock::Two) => (4, 1.0),
-        (TemporalMode::Upscale, UpscaleBlock::Four) => (16, 1.3),
+        (TemporalMode::Upscale, UpscaleBlock::Two) => (1, 4.0),
+        (TemporalMode::Upscale, UpscaleBlock::Four) => (1, 4.0),
     }
 }
 
