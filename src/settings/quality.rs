@@ -61,8 +61,9 @@ pub enum TemporalMode {
     /// The last picture, reprojected, with `alpha` of the newest frame blended in (Högfeldt 6.1). Two frames of memory;
     /// changes of light lag by about 1/`alpha` frames, and motion softens it.
     Exponential,
-    /// One texel of each `block` is marched a frame; the others are taken from the last picture. Cheapest; fast
-    /// motion and changes of light show late or soft. A texel shows the mean of its last `window` samples, of 8 at most: more
+    /// One texel of each `block` is marched a frame; the others are taken from the last picture. Cheapest; fast motion and
+    /// changes of light show late or soft. What was hidden or off the screen is marched whole at once, and so is cloud that
+    /// the camera flies close by, of which little is held: up to what [`Exponential`](Self::Exponential) costs there. A texel shows the mean of its last `window` samples, of 8 at most: more
     /// would take hundreds of frames to change.
     Upscale,
 }
@@ -74,7 +75,8 @@ pub enum UpscaleBlock {
     /// 2×2: a quarter is marched; the default.
     #[default]
     Two,
-    /// 4×4: a sixteenth is marched. What a moving object uncovers is right after 16 frames, not after 4 as elsewhere.
+    /// 4×4: a sixteenth is marched, or a quarter where the picture is of fewer than five samples: after a cut, and behind
+    /// what has just come into view.
     Four,
 }
 

@@ -117,9 +117,8 @@ fn due(mode: Mode) -> (usize, f32) {
         (TemporalMode::Off, _) => (1, 1.0),
         // As the mean of four frames.
         (TemporalMode::SlidingWindow | TemporalMode::Exponential, _) => (4, 0.5),
-        // Each texel is marched once in four frames, or once in sixteen: no sooner can it be as right as a single frame.
-        (TemporalMode::Upscale, UpscaleBlock::Two) => (1, 4.0),
-        (TemporalMode::Upscale, UpscaleBlock::Four) => (1, 4.0),
+        // Marched at once, and then no oftener than all else: as right as a single frame.
+        (TemporalMode::Upscale, _) => (1, 1.0),
     }
 }
 
