@@ -63,8 +63,8 @@ pub enum TemporalMode {
     Exponential,
     /// One texel of each `block` is marched a frame; the others are taken from the last picture. Cheapest; fast motion and
     /// changes of light show late or soft. What was hidden or off the screen is marched whole at once, and so is cloud that
-    /// the camera flies close by, of which little is held: up to what [`Exponential`](Self::Exponential) costs there. A texel shows the mean of its last `window` samples, of 8 at most: more
-    /// would take hundreds of frames to change.
+    /// the camera flies close by, of which little is held: up to what [`Exponential`](Self::Exponential) costs there. A texel
+    /// shows the mean of its last `window` samples, of 8 at most: more would take hundreds of frames to change.
     Upscale,
 }
 

@@ -118,7 +118,8 @@ fn due(mode: Mode) -> (usize, f32) {
         // As the mean of four frames.
         (TemporalMode::SlidingWindow | TemporalMode::Exponential, _) => (4, 0.5),
         // Marched at once, and then no oftener than all else: as right as a single frame.
-        (TemporalMode::Upscale, _) => (1, 1.2),
+        (TemporalMode::Upscale, UpscaleBlock::Two) => (4, 1.0),
+        (TemporalMode::Upscale, UpscaleBlock::Four) => (1, 1.2),
     }
 }
 
