@@ -112,21 +112,27 @@ fn still(screen: &mut Screen, part: Part) {
     });
 }
 
-/// Folds a group of the panel, or unfolds it.
-fn fold(screen: &mut Screen, [x, y]: [usize; 2]) {
+/// Whether the triangle before a group's title points down, which is heavier above its middle; one that points right
+/// is as heavy below.
+fn unfolded(now: &Picture, [x, y]: [usize; 2]) -> bool {
+    let [above, below] = [[x - 25, y - 7, x - 11, y], [x - 25, y, x - 11, y + 7]].map(|half| now.brightness(half));
+    above > 1.2 * below
+}
+
+/// Clicks on a group's title until it is folded, or unfolded. A click that came late, or while titles still moved, is
+/// made good by the next.
+fn fold(screen: &mut Screen, title: [usize; 2], folded: bool) {
     // Titles move while another group folds, and change when pointed at.
-    screen.act(&["mousemove", &x.to_string(), &y.to_string()]);
+    screen.act(&["mousemove", &title[0].to_string(), &title[1].to_string()]);
     still(screen, PANEL);
-    let triangle = [250, y - 7, 264, y + 7];
-    let before = screen.picture();
     let mut clicked = None::<Instant>;
-    wait("a group to fold", PATIENCE, || {
+    wait("a group to fold or unfold", PATIENCE, || {
         screen.check();
         if clicked.is_none_or(|last| last.elapsed() > Duration::from_secs(20)) {
-            screen.click([x, y]);
+            screen.click(title);
             clicked = Some(Instant::now());
         }
-        (screen.picture().differs(&before, triangle) > 1.0).then_some(())
+        (unfolded(&screen.picture(), title) != folded).then_some(())
     });
 }
 
@@ -140,13 +146,16 @@ fn keys_change_quality_and_clock_as_the_panel_shows() {
     screen.wait_for("I to open the panel", |now| now.brightness(PANEL) < 60.0);
     // Folded, each group's title is 21 pixels below the one before; between the second and the third is one more row.
     let [preset, modelling, sampling, clock] = [0, 1, 4, 5].map(|row| [275, 50 + 21 * row]);
-    [preset, modelling, sampling].into_iter().for_each(|group| fold(&mut screen, group));
+    fold(&mut screen, preset, true);
+    fold(&mut screen, modelling, true);
+    fold(&mut screen, sampling, false);
     still(&mut screen, PANEL);
     for key in ["2", "3", "4", "1"] {
         screen.press(key, PANEL);
         still(&mut screen, PANEL);
     }
-    [sampling, clock].into_iter().for_each(|group| fold(&mut screen, group));
+    fold(&mut screen, sampling, true);
+    fold(&mut screen, clock, false);
     screen.act(&["mousemove", "100", "250"]);
     // It shows the clock's seconds, which run.
     let before = screen.picture();

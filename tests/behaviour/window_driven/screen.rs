@@ -12,7 +12,7 @@ use std::{
 
 use crate::headless;
 
-pub const PATIENCE: Duration = Duration::from_secs(120);
+pub const PATIENCE: Duration = Duration::from_secs(300);
 pub const SCREEN: [usize; 2] = [960, 540];
 
 pub fn binary(name: &str) -> PathBuf {
