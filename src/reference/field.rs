@@ -150,7 +150,10 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         let mut sum = Medium::EMPTY;
         let own = [self.model.bottom, self.model.top].map(f64::from);
         if self.has_profile() && h > own[0] && h < own[1] {
-            sum = Medium { span: DVec2::new(h - own[0], own[1] - h), ..self.sample_profile(p, h, lod) };
+            let one = self.sample_profile(p, h, lod);
+            if one.density > 0.0 {
+                sum = Medium { span: DVec2::new(h - own[0], own[1] - h), ..one };
+            }
         }
         for layer in self.layers() {
             let [bottom, top] = [layer.layer.bottom, layer.layer.top].map(f64::from);
@@ -218,10 +221,14 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         let height = self.layer_height(h);
         let m = self.leaning_position(p, height);
         let profile = self.dimensional_profile(m, height, lod);
+        // The shader ends as soon as what it has read leaves nothing; here all is read.
         if profile <= 0.0 {
             return Medium::EMPTY;
         }
         let density = self.erode(profile, self.cloud_noise(m, h, height, lod)) * f64::from(model.density);
+        if density <= 0.0 {
+            return Medium::EMPTY;
+        }
         Medium {
             density,
             extinction: density * f64::from(model.extinction),

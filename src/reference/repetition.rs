@@ -78,7 +78,8 @@ fn of_layers() -> One {
 
 /// The thesis's.
 fn of_model() -> One {
-    let model = CloudModel { wind: DVec3::new(WIND, 0.0, 0.0).as_vec3(), ..CloudModel::default() };
+    // The bare profile: noise has a repeat of its own.
+    let model = CloudModel { wind: DVec3::new(WIND, 0.0, 0.0).as_vec3(), noise_strength: 0.0, ..CloudModel::default() };
     One {
         scale: model.map_scale.into(),
         height: f64::from(0.5 * (model.bottom + model.top)),

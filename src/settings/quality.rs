@@ -144,7 +144,7 @@ pub struct CloudQuality {
     #[reflect(@1.0..=4.0_f32)]
     pub light_growth: f32,
     /// The march stops where transmittance falls to this (thesis: 0.075); what lies behind is only guessed at, for the sky
-    /// that shines through. Default 0.01.
+    /// that shines through. Default 0.02.
     #[reflect(@0.0..=0.9_f32)]
     pub transmittance_stop: f32,
     /// Samples whose density is below this are skipped (thesis: 0.01). Default 0.002.
@@ -219,7 +219,7 @@ impl CloudQuality {
             light_steps: 6,
             light_step: 45.0,
             light_growth: 1.9,
-            transmittance_stop: 0.01,
+            transmittance_stop: 0.02,
             density_skip: 0.002,
             max_distance: 150_000.0,
             lod_bias: 0.0,
@@ -240,9 +240,6 @@ impl CloudQuality {
             step: 60.0,
             step_growth: 0.006,
             max_steps: 2048,
-            light_steps: 16,
-            light_step: 20.0,
-            light_growth: 1.3,
             transmittance_stop: 0.005,
             density_skip: 0.001,
             ..Self::high()

@@ -58,8 +58,8 @@ const ALONE: [Change; 27] = [
     ("phase_cut_none", "phase not cut", &["lighting.phase_limit=100000"]),
     ("ambient_off", "no ambient light", &["lighting.ambient_strength=0"]),
     ("light_4", "4 light steps", &LIGHT_FEW),
-    ("light_6", "6 light steps (Low's to High's)", &LIGHT_HIGH),
-    ("light_16", "16 light steps (Ultra's)", &LIGHT_ULTRA),
+    ("light_6", "6 light steps (all presets')", &LIGHT_PRESETS),
+    ("light_16", "16 light steps", &LIGHT_MANY),
     ("step_140", "step 140 m (Low's)", &["quality.step=140", "quality.step_growth=0.014"]),
     ("step_100", "step 100 m (High's)", &["quality.step=100", "quality.step_growth=0.009"]),
     ("step_60", "step 60 m (Ultra's)", &["quality.step=60", "quality.step_growth=0.006"]),
@@ -67,7 +67,7 @@ const ALONE: [Change; 27] = [
     ("quarter", "quarter resolution", &["quality.resolution=quarter"]),
     ("window_1", "1 frame", &["quality.temporal=off"]),
     ("window_8", "8 frames", &["quality.window=8"]),
-    ("stop_high", "stop at transmittance .01 (High's)", &["quality.transmittance_stop=0.01"]),
+    ("stop_high", "stop at transmittance .02 (High's)", &["quality.transmittance_stop=0.02"]),
     ("stop_thesis", "stop at transmittance .075 (thesis)", &["quality.transmittance_stop=0.075"]),
     ("skip_high", "skip density below .002 (High's)", &["quality.density_skip=0.002"]),
     ("skip_thesis", "skip density below .01 (thesis)", &["quality.density_skip=0.01"]),
@@ -76,8 +76,8 @@ const ALONE: [Change; 27] = [
     ("distance_50", "50 km", &["quality.max_distance=50000"]),
 ];
 const LIGHT_FEW: [&str; 3] = ["quality.light_steps=4", "quality.light_step=60", "quality.light_growth=2.2"];
-const LIGHT_HIGH: [&str; 3] = ["quality.light_steps=6", "quality.light_step=45", "quality.light_growth=1.9"];
-const LIGHT_ULTRA: [&str; 3] = ["quality.light_steps=16", "quality.light_step=20", "quality.light_growth=1.3"];
+const LIGHT_PRESETS: [&str; 3] = ["quality.light_steps=6", "quality.light_step=45", "quality.light_growth=1.9"];
+const LIGHT_MANY: [&str; 3] = ["quality.light_steps=16", "quality.light_step=20", "quality.light_growth=1.3"];
 
 const UPSCALE: [&str; 3] = ["quality.resolution=full", "quality.temporal=upscale", "quality.block=two"];
 
@@ -89,7 +89,7 @@ const FROM_HIGH: [Change; 8] = [
     ("high_quarter", "High, quarter resolution", &["quality.resolution=quarter"]),
     ("high_upscale", "High, full resolution, a quarter of it a frame", &UPSCALE),
     ("high_step_60", "High, step 60 m", &["quality.step=60", "quality.step_growth=0.006"]),
-    ("high_light_16", "High, 16 light steps", &LIGHT_ULTRA),
+    ("high_light_16", "High, 16 light steps", &LIGHT_MANY),
     ("high_90", "High, 90 km", &["quality.max_distance=90000"]),
 ];
 
