@@ -42,8 +42,9 @@ const WHY: &str = "
 - **Window.** The step grows from 9 m to 100 m, so the steps fall to 1/11. The gain is nearer to that the more of a frame is
   steps: below it there is what every ray costs before its first step.
 - **Adaptive step.** The thesis takes long steps through empty air and steps back on entry. We ask the coverage map's pyramid of
-  maxima, which never steps over a cloud and never back. It gains where the sky is open; under a closed deck nothing is
-  empty.
+  maxima, which never steps over a cloud and never back. It gains where the map is 0. In this sky it is so nowhere, since
+  some coverage is added everywhere (`model.coverage`), which noise takes away again; that gains by reading no further where
+  nothing can be left, which every rung does.
 - **Half and quarter.** Rays fall to 1/4 and 1/16. The time follows as long as there are rays enough to fill the device: at a
   few milliseconds the thesis's GPU no longer has them, and at quarter resolution a small picture of ours leaves workgroups
   of 8×8 rays partly empty. Coarser rays also read coarser noise, which leaves a little less cloud to light: see the
