@@ -30,7 +30,7 @@ const SMALL_SIZE: &str = "128x72";
 const SAMPLES: u32 = 128;
 const FULL_SAMPLES: u32 = 4096;
 /// Rungs are measured so many times, one after another, so that a machine that slows down does not tilt the ladder.
-const ROUNDS: usize = 3;
+const ROUNDS: usize = 8;
 const TIMED_FRAMES: u32 = 4;
 /// Name of the ladder itself among the parts that `--only` takes.
 const LADDER: &str = "rungs";
