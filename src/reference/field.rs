@@ -151,7 +151,7 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         let own = [self.model.bottom, self.model.top].map(f64::from);
         if self.has_profile() && h > own[0] && h < own[1] {
             let one = self.sample_profile(p, h, lod);
-            if one.density > 0.0 {
+            if one.extinction > 0.0 {
                 sum = Medium { span: DVec2::new(h - own[0], own[1] - h), ..one };
             }
         }
