@@ -1,5 +1,5 @@
-//! The built-in model, "what is at p?". Twin of `model/model.wesl` and `model/profile.wesl`, function for function;
-//! weather-map layers are in `layer.rs`.
+//! The built-in model, "what is at p?". Twin of `model/model.wesl` and `model/profile.wesl`, function for function,
+//! except that the shader ends early where what it has read leaves nothing. Weather-map layers are in `layer.rs`.
 //!
 //! Offsets and rates are those that the shader is given (`model/uniform.rs`); positions are f64. What is read from
 //! textures comes through [`ModelTextures`]. A [`ModelShader`](crate::ModelShader) has no twin.
@@ -28,7 +28,7 @@ pub struct Medium {
     pub extinction: f64,
     /// Single-scattering albedo σs/σt, linear RGB.
     pub albedo: DVec3,
-    /// Dimensional profile: 0 at the cloud's envelope, 1 deep inside.
+    /// Dimensional profile: 0 at the cloud's envelope and outside, 1 deep inside.
     pub profile: f64,
     /// Way straight down and up to the ends of the layer it lies in (m); the mean by extinction where layers overlap.
     pub span: DVec2,
@@ -221,7 +221,6 @@ impl<'a, T: ModelTextures> LocalModel<'a, T> {
         let height = self.layer_height(h);
         let m = self.leaning_position(p, height);
         let profile = self.dimensional_profile(m, height, lod);
-        // The shader ends as soon as what it has read leaves nothing; here all is read.
         if profile <= 0.0 {
             return Medium::EMPTY;
         }

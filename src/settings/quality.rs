@@ -124,7 +124,8 @@ pub struct CloudQuality {
     /// Length of a step through empty air, in small steps (1 turns adaptive stepping off). Default 4.
     #[reflect(@1..=16_u32)]
     pub long_step: u32,
-    /// Empty small steps in a row after which the march returns to long ones. Default 6.
+    /// Empty small steps in a row after which the march tries a long one, and tries again where there might have been cloud.
+    /// Default 6.
     #[reflect(@1..=64_u32)]
     pub empty_steps: u32,
     /// Steps a ray may take, long and small together: once it has taken half of them, they grow so that the rest reaches to
