@@ -1,0 +1,101 @@
+//! The air between clouds and the camera, and the sky above them, from where Bevy's tables do not reach.
+
+use bevy::{
+    pbr::{AtmosphereMode, AtmosphereSettings},
+    prelude::*,
+};
+use bevy_cumulus::{ModelShader, prelude::*};
+
+use crate::support::{
+    app::{Sky, View, cloud_pixels, clouds_app_with, spawn_sun, spawn_view, until_drawn},
+    gpu::webgpu_limits,
+    scene::{exact, settle},
+};
+
+const SIZE: UVec2 = UVec2::new(24, 16);
+const TOP: f32 = 1500.0;
+
+/// An opaque deck of this albedo up to [`TOP`], under Bevy's atmosphere.
+fn deck(albedo: f32, lighting: CloudLighting) -> (App, View) {
+    let model = ModelShader(format!(
+        "import package::model::{{medium::{{Medium, empty_medium}}, planet::altitude}};
+        fn model_bounds() -> vec2<f32> {{ return vec2(500.0, {TOP:?}); }}
+        fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{ return 1.0; }}
+        fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
+            let h = altitude(p, 6360000.0);
+            if h < 500.0 || h > {TOP:?} {{ return empty_medium(); }}
+            return Medium(1.0, 0.05, vec3({albedo:?}), 0.5, vec2(h - 500.0, {TOP:?} - h), vec4(1.0, 0.0, 0.0, 0.0));
+        }}"
+    ));
+    let insert = move |app: &mut App| {
+        app.insert_resource(model.clone());
+    };
+    let mut app = clouds_app_with((insert, CloudsPlugin));
+    app.insert_resource(CloudQuality { step: 20.0, ..exact(MarchResolution::Full) }).insert_resource(lighting);
+    spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
+    let view = spawn_view(&mut app, SIZE, Transform::default(), Sky::Atmosphere);
+    until_drawn(&mut app);
+    (app, view)
+}
+
+/// Mean radiance of the clouds, looking down by `pitch` degrees from this altitude.
+fn seen_from(app: &mut App, view: &View, altitude: f32, pitch: f32) -> Vec3 {
+    let down = Quat::from_rotation_x(-pitch.to_radians());
+    app.world_mut().entity_mut(view.camera).insert(Transform::from_xyz(0.0, altitude, 0.0).with_rotation(down));
+    settle(app);
+    let pixels = cloud_pixels(app, view);
+    assert!(pixels.iter().all(|p| p.is_finite() && p.w < 0.02), "the deck is not opaque from {altitude} m");
+    pixels.iter().map(|p| p.truncate()).sum::<Vec3>() / pixels.len() as f32
+}
+
+#[test]
+fn marched_air_is_what_bevys_table_holds() {
+    // Under WebGPU's limits there is no atmosphere.
+    if webgpu_limits() {
+        return;
+    }
+    // A deck that sends no light of its own, within the table's 32 km.
+    let (mut app, view) = deck(0.0, CloudLighting::default());
+    for (altitude, pitch) in [(4000.0, 50.0), (8000.0, 60.0)] {
+        let [table, marched] = [AtmosphereMode::LookupTexture, AtmosphereMode::Raymarched].map(|mode| {
+            let mut air = app.world_mut().get_mut::<AtmosphereSettings>(view.camera).expect("it has an atmosphere");
+            air.rendering_method = mode;
+            seen_from(&mut app, &view, altitude, pitch)
+        });
+        println!("from {altitude} m: {table} in the table, {marched} marched");
+        assert!(table.min_element() > 10.0, "there is no air: {table}");
+        assert!(
+            (marched / table - 1.0).abs().max_element() < 0.1,
+            "from {altitude} m: {marched}, {table} in the table"
+        );
+    }
+}
+
+#[test]
+fn from_space_there_is_blue_air_before_the_clouds() {
+    if webgpu_limits() {
+        return;
+    }
+    let (mut app, view) = deck(0.0, CloudLighting::default());
+    let light = seen_from(&mut app, &view, 400_000.0, 50.0);
+    println!("{light}");
+    // As much as from below all of the air, where the table would do: some thousand cd/m², and blue.
+    assert!(light.y > 500.0 && light.y < 10_000.0 && light.z > 1.5 * light.x, "{light}");
+}
+
+#[test]
+fn from_space_clouds_are_lit_by_the_sky_that_is_over_them() {
+    if webgpu_limits() {
+        return;
+    }
+    // By sky and ground alone, through no air.
+    let lighting = CloudLighting { octaves: 0, diffusion: 0.0, aerial_perspective: 0.0, ..default() };
+    let (mut app, view) = deck(0.999, lighting);
+    let near = seen_from(&mut app, &view, TOP + 50.0, 80.0);
+    for altitude in [10_000.0, 400_000.0] {
+        let far = seen_from(&mut app, &view, altitude, 80.0);
+        println!("{near} from near, {far} from {altitude} m");
+        // Bevy's sky table is made in 16 even steps, of which the first passes over half of the densest air.
+        assert!((far / near - 1.0).abs().max_element() < 0.25, "{near} from near, {far} from {altitude} m");
+    }
+}

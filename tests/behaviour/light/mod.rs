@@ -1,0 +1,3 @@
+//! Light that reaches the clouds and the camera.
+
+mod marched_air;

@@ -1,0 +1,4 @@
+//! Preset files: loading, following, keys.
+
+mod files;
+mod keys;

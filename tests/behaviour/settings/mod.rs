@@ -1,0 +1,4 @@
+//! Settings and the paths that set them.
+
+mod fields;
+mod hogfeldt_controls;

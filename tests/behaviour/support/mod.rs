@@ -1,0 +1,14 @@
+//! What tests share: running apps, cameras and pictures, answers in closed form.
+
+pub mod adding_doubling;
+pub mod app;
+pub mod density;
+pub mod evaluate;
+pub mod golden;
+pub mod gpu;
+pub mod half;
+pub mod path_trace;
+pub mod program;
+pub mod scene;
+pub mod slab;
+pub mod temporal_modes;

@@ -1,0 +1,93 @@
+//! Uniform slabs before the path tracer: one direction, lit by the sun or by the sky alone.
+
+use bevy::{light::light_consts::lux, math::DVec3, prelude::*};
+use bevy_cumulus::{CloudsPlugin, ModelShader, prelude::*, reference::planet::PLANET_RADIUS};
+
+use super::{
+    app::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, spawn_view, until_drawn},
+    gpu::run_updates,
+};
+
+pub const BOTTOM: f64 = 1000.0;
+pub const THICKNESS: f64 = 1000.0;
+
+/// Radiance of the sky (cd/m²).
+pub const SKY: f64 = 1000.0;
+
+/// A uniform slab of this vertical optical depth; one albedo a colour channel.
+pub fn slab(depth: f64, albedo: [f64; 3]) -> ModelShader {
+    mixed_slab(depth, albedo, [1.0, 0.0, 0.0, 0.0])
+}
+
+/// The same, with these shares of the phase functions.
+pub fn mixed_slab(depth: f64, [r, g, b]: [f64; 3], [p, q, s, t]: [f64; 4]) -> ModelShader {
+    let (top, extinction) = (BOTTOM + THICKNESS, depth / THICKNESS);
+    ModelShader(format!(
+        "import package::model::{{medium::{{Medium, empty_medium}}, planet::altitude}};
+        fn model_bounds() -> vec2<f32> {{ return vec2({BOTTOM:?}, {top:?}); }}
+        fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{ return 1.0; }}
+        // Twice what is needed, so that null collisions happen.
+        fn extinction_bound(p: vec3<f32>, lod: f32) -> f32 {{ return 2.0 * {extinction:?}; }}
+        fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
+            let h = altitude(p, {PLANET_RADIUS:?});
+            if h < {BOTTOM:?} || h > {top:?} {{ return empty_medium(); }}
+            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, vec2(h - {BOTTOM:?}, {top:?} - h),
+                vec4({p:?}, {q:?}, {s:?}, {t:?}));
+        }}"
+    ))
+}
+
+/// Paths, a sky of radiance `sky` everywhere above, no ground bounce.
+pub fn traced_app(model: Option<ModelShader>, lighting: CloudLighting) -> App {
+    let mut app = match model {
+        Some(model) => clouds_app_with(move |app: &mut App| {
+            app.insert_resource(model.clone()).add_plugins(CloudsPlugin);
+        }),
+        None => clouds_app(),
+    };
+    app.insert_resource(CloudQuality { max_distance: 2_000_000.0, ..CloudQuality::reference() });
+    app.insert_resource(CloudLighting { fade_start: 1.0, aerial_perspective: 0.0, ..lighting });
+    app
+}
+
+/// Light by the sky alone: the sun stands below the ground.
+pub fn sky_light(phase: PhaseFunction) -> CloudLighting {
+    let fallback = (SKY / f64::from(lux::RAW_SUNLIGHT)) as f32;
+    CloudLighting { phase, sky_fallback: Vec3::splat(fallback), ground_albedo: Vec3::ZERO, ..default() }
+}
+
+/// Light by the sun alone.
+pub fn sun_light(phase: PhaseFunction) -> CloudLighting {
+    CloudLighting { sky_fallback: Vec3::ZERO, ..sky_light(phase) }
+}
+
+/// A camera that sees one direction: up by `mu`, the cosine to the vertical, from just outside the slab.
+pub fn spawn_pinhole(app: &mut App, size: UVec2, mu: f64) -> View {
+    let height = if mu > 0.0 { BOTTOM - 20.0 } else { BOTTOM + THICKNESS + 20.0 };
+    let direction = DVec3::new((1.0 - mu * mu).max(0.0).sqrt(), mu, 0.0).as_vec3();
+    let looking = Transform::from_xyz(0.0, height as f32, 0.0).looking_to(direction, Vec3::Z);
+    let view = spawn_view(app, size, looking, Sky::Black);
+    let narrow = PerspectiveProjection { fov: 0.002, ..default() };
+    app.world_mut().entity_mut(view.camera).insert(Projection::Perspective(narrow));
+    view
+}
+
+/// Mean radiance and transmittance after so many frames, one sample a pixel each.
+pub fn mean(app: &mut App, view: &View, frames: u32) -> [f64; 4] {
+    until_drawn(app);
+    // A new start, so that as many samples are counted as were asked for.
+    app.world_mut().get_mut::<CloudView>(view.camera).unwrap().reset += 1;
+    run_updates(app, frames);
+    let pixels = cloud_pixels(app, view);
+    let sum = pixels.iter().fold([0.0; 4], |sum, p| std::array::from_fn(|i| sum[i] + f64::from(p[i])));
+    sum.map(|s| s / pixels.len() as f64)
+}
+
+pub fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
+    assert!((found / expected - 1.0).abs() < relative, "{what}: {found}, not {expected}");
+}
+
+/// Where the sun stands for its light to come from `mu` above the horizon, 90° to the side of the pinhole's direction.
+pub fn light_from(mu: f64) -> Vec3 {
+    -DVec3::new(0.0, mu, (1.0 - mu * mu).sqrt()).as_vec3()
+}
