@@ -41,6 +41,8 @@ pub mod phases;
 pub mod reference;
 mod render;
 pub mod settings;
+#[doc(hidden)]
+pub mod testing;
 pub mod textures;
 pub mod weather;
 

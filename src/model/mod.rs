@@ -8,7 +8,6 @@ mod check;
 mod layers;
 mod lines;
 mod places;
-mod probe;
 mod space;
 mod uniform;
 mod zone_at;

@@ -90,6 +90,11 @@ impl FrameUniform {
         self.limits.z
     }
 
+    /// All that accumulating frames asks for, and nothing else.
+    pub fn of_window(size: UVec2, index: u32, layers: UVec4) -> Self {
+        Self { size: UVec4::new(size.x, size.y, 1, index & 255), layers, ..default() }
+    }
+
     pub fn new(input: &FrameInput) -> Self {
         let FrameInput { space, sun, quality, lighting, phases, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();

@@ -35,7 +35,8 @@ use crate::model::ModelBindings;
 pub use buffer::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise};
 pub(crate) use frame::FrameUniform;
 pub(crate) use phase_slots::{PHASE_SLOTS, phase_tables_layout};
-pub(crate) use pipelines::depth_layout;
+pub(crate) use pipelines::{CloudPipelines, depth_layout};
+pub(crate) use reproject::HeldUniform;
 pub use status::CloudStatus;
 pub(crate) use status::StatusFlags;
 

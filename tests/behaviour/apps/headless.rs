@@ -1,20 +1,10 @@
 //! The headless example, run as a user runs it.
 
-use std::{
-    collections::BTreeSet,
-    fs,
-    ops::Deref,
-    path::{Path, PathBuf},
-    process::{Command, Output},
-    sync::{
-        LazyLock,
-        atomic::{AtomicU32, Ordering},
-    },
-};
+use std::{collections::BTreeSet, fs, path::Path, process::Output, sync::LazyLock};
 
 use crate::support::program::{Folder, command, read, read_cloud};
 use bevy_cumulus::settings::{CloudPreset, CloudSettings};
-use image::{DynamicImage, ImageReader, Rgba32FImage};
+use image::Rgba32FImage;
 use serde_json::Value;
 
 /// An example has no tests of its own.
@@ -252,7 +242,7 @@ fn the_timings_file_has_every_key() {
 #[test]
 fn the_same_command_gives_the_same_clouds_from_any_folder() {
     let again = render(&[SHOT, &["--scene", "ground_noon", "--out", "shot.png"]].concat());
-    assert_ne!(again.0, WRITTEN.0);
+    assert_ne!(*again, **WRITTEN);
     let (first, second) = (read_cloud(&WRITTEN.join("cloud.exr")), read_cloud(&again.join("cloud.exr")));
     assert!(first == second, "two runs differ");
 }

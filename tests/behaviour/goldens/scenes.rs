@@ -3,12 +3,9 @@
 //! Each is made by the headless example and compared with `tests/goldens/NAME.png`. After a change of the look that is
 //! meant, `CUMULUS_BLESS=1 cargo test --test behaviour goldens` writes them anew: look at each before it is committed.
 
-use std::{
-    fs,
-    path::{Path, PathBuf},
-};
+use std::fs;
 
-use image::{ImageReader, RgbImage};
+use image::RgbImage;
 
 use crate::support::{
     golden::{compare, compare_with_golden, failures, folder, is_alike, read},

@@ -4,25 +4,17 @@
 //! What is drawn is stored as f16. A device may round or cut (Mesa's software driver cuts): up to 2⁻¹⁰ = 9.8e-4 of the
 //! value.
 
-use std::{f64::consts::PI, path::Path};
+use std::path::Path;
 
-use bevy::{
-    light::light_consts::lux,
-    math::{DVec2, DVec3},
-    prelude::*,
-};
-use bevy_cumulus::{
-    CloudsPlugin, ModelShader,
-    prelude::*,
-    reference::planet::{PLANET_RADIUS, altitude, shell_intervals},
-};
+use bevy::{math::DVec3, prelude::*};
+use bevy_cumulus::{ModelShader, prelude::*};
 
 use crate::support::{
-    app::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
     gpu::{assert_shaders_compile, run_until, run_updates},
     slab::{
-        ALBEDO, BOTTOM, LEAST, SIZE, STORED, TOP, directions, exact_march, full_radiance, gathered, length_in_slab,
-        looking, plain_light, seen_from, slab, slab_app, spans,
+        LEAST, SIZE, STORED, directions, exact_march, full_radiance, gathered, length_in_slab, looking, plain_light,
+        seen_from, slab, slab_app, spans,
     },
 };
 

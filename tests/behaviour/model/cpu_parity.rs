@@ -6,7 +6,6 @@
 use bevy::{
     app::App,
     math::{DVec2, DVec3, Vec3},
-    render::render_resource::{BindGroup, BindGroupLayoutDescriptor},
 };
 use bevy_cumulus::reference::{
     integrate::{mean_transmittance, step_energy_conserving, step_naive},

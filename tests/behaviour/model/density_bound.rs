@@ -1,7 +1,7 @@
 //! The model's promises to the renderer, asked of the GPU with the real textures.
 
 use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::{ModelShader, prelude::*, textures::CloudTextureStatus};
+use bevy_cumulus::prelude::*;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::support::density::{Question, ask, at, model_app, point, question};

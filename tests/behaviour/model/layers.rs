@@ -1,7 +1,8 @@
 //! Weather-map layers: their bounds, their sum, their place in time, and what is wrong with them.
 
 use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::{ModelShader, prelude::*, settings::LayerKind};
+use bevy_cumulus::testing::model_bindings;
+use bevy_cumulus::{prelude::*, settings::LayerKind};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::robustness::bad_input::refuses;
@@ -83,7 +84,7 @@ pub fn show(app: &mut App, layers: &[CloudLayer]) -> CloudModel {
     run_updates(app, 2);
     run_until(app, "the layers' maps", 600, |app| {
         let status = app.world().resource::<bevy_cumulus::textures::CloudTextureStatus>();
-        !status.baking && ModelShader::bindings(app, DVec3::ZERO).is_ok()
+        !status.baking && model_bindings(app, DVec3::ZERO).is_ok()
     });
     // Where questions are asked: around all of the layers.
     let bottom = layers.iter().map(CloudLayer::bottom).fold(f32::INFINITY, f32::min);

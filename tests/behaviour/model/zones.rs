@@ -1,7 +1,8 @@
 //! Zones of more cloud or none.
 
 use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::{ModelShader, prelude::*, settings::Validate, textures::CloudTextureStatus};
+use bevy_cumulus::testing::model_bindings;
+use bevy_cumulus::{prelude::*, settings::Validate, textures::CloudTextureStatus};
 
 use crate::support::{
     app::{Sky, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
@@ -43,7 +44,7 @@ fn ask(app: &mut App) -> Ground {
         (0..96 * 96).map(|i| Vec2::new((i % 96) as f32, (i / 96) as f32) * 400.0 - 19_200.0).collect();
     let curve = |at: Vec2| at.length_squared() / (2.0 * 6.36e6);
     let questions: Vec<f32> = places.iter().flat_map(|at| [at.x, HEIGHT - curve(*at), at.y, LOD]).collect();
-    let group = ModelShader::bindings(app, DVec3::ZERO).expect("the model can be bound");
+    let group = model_bindings(app, DVec3::ZERO).expect("the model can be bound");
     let answers = run_compute_with(app, ASK, Some(&group), &questions, 2 * places.len(), places.len() as u32);
     Ground { places, answers: answers.as_chunks().0.to_vec() }
 }
@@ -77,7 +78,7 @@ fn model_app(layered: bool) -> App {
     for _ in 0..2 {
         run_updates(&mut app, 4);
         run_until(&mut app, "the textures are there", 900, |app| {
-            !app.world().resource::<CloudTextureStatus>().baking && ModelShader::bindings(app, DVec3::ZERO).is_ok()
+            !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
         });
     }
     app

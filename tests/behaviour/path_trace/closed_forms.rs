@@ -2,23 +2,19 @@
 
 use std::f64::consts::PI;
 
-use bevy::{light::light_consts::lux, math::DVec3, prelude::*};
+use bevy::{light::light_consts::lux, prelude::*};
 use bevy_cumulus::{
-    CloudNoise, CloudsPlugin, ModelShader,
+    CloudNoise,
     prelude::*,
-    reference::{
-        phase::{HgDraine, Phase, hg, schlick_k},
-        planet::PLANET_RADIUS,
-    },
+    reference::phase::{HgDraine, Phase, hg, schlick_k},
 };
 
 use crate::support::{
     adding_doubling::{Slab, gauss, h_function, moments},
-    app::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, read_image, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, cloud_pixels, read_image, spawn_sun, spawn_view},
     gpu::{run_compute, run_updates, shader_app},
     path_trace::{
-        SKY, THICKNESS, assert_near, light_from, mean, mixed_slab, sky_light, slab, spawn_pinhole, sun_light,
-        traced_app,
+        SKY, THICKNESS, assert_near, light_from, mean, sky_light, slab, spawn_pinhole, sun_light, traced_app,
     },
     scene::{settle, spawn_box},
 };

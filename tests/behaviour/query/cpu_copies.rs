@@ -10,14 +10,9 @@ use bevy::{
         renderer::RenderGraph,
     },
 };
+use bevy_cumulus::testing::textures::{self as captured, Captured};
 use bevy_cumulus::{
-    CloudFieldError, ModelShader,
-    prelude::*,
-    reference::field::ModelTextures,
-    textures::{
-        CloudTextureSlot,
-        capture::{self, Captured},
-    },
+    CloudFieldError, ModelShader, prelude::*, reference::field::ModelTextures, textures::CloudTextureSlot,
 };
 
 use super::{field_app, sky, small, until_current};
@@ -40,10 +35,10 @@ fn put(app: &mut App, image: Image, set: impl FnOnce(&mut CloudTextureSlots, Han
 
 /// Every texel of every level, as the GPU has it, against the twin's at the texel's centre.
 fn assert_same(app: &App, slot: CloudTextureSlot, read: impl Fn(DVec3, f64) -> f64, value: impl Fn([f32; 4]) -> f32) {
-    let levels = capture::levels(app, slot);
+    let levels = captured::levels(app, slot);
     assert!(levels > 0, "{slot}");
     for level in 0..levels {
-        let Captured { size, texels } = capture::read(app, slot, level).unwrap();
+        let Captured { size, texels } = captured::read(app, slot, level).unwrap();
         for (i, texel) in (0..).zip(&texels) {
             let at = UVec3::new(i % size.x, i / size.x % size.y, i / (size.x * size.y));
             let found = read((at.as_dvec3() + 0.5) / size.as_dvec3(), level.into());

@@ -6,8 +6,8 @@ use bevy::{
     math::{DVec2, DVec3, DVec4},
     prelude::*,
 };
+use bevy_cumulus::testing::model_bindings;
 use bevy_cumulus::{
-    ModelShader,
     prelude::*,
     reference::{
         field::{LayerSides, LocalModel, Medium, ModelTextures},
@@ -357,7 +357,7 @@ fn gpu_and_cpu_agree_on_layers_at_100_000_points() {
         let twin = LocalModel::new(&model, sky.layers(), seconds, camera, planet, sky.textures()).unwrap();
         let rough = LocalModel::new(&model, sky.layers(), seconds, camera, planet, &wrong).unwrap();
         let points: Vec<[f32; 4]> = (0..20_000).map(|_| point(&mut rng, twin.bounds())).collect();
-        let group = ModelShader::bindings(&app, camera).expect("the model can be bound");
+        let group = model_bindings(&app, camera).expect("the model can be bound");
         let (n, count) = (12 * points.len(), points.len() as u32);
         let found = run_compute_with(&mut app, ASK, Some(&group), points.as_flattened(), n, count);
         let mut own = Vec::new();

@@ -1,8 +1,8 @@
 //! What passes through cloud: the twin's integrals against fine marches, on the GPU and on the CPU.
 
 use bevy::{math::DVec3, prelude::*};
+use bevy_cumulus::testing::model_bindings;
 use bevy_cumulus::{
-    ModelShader,
     prelude::*,
     reference::{
         field::LocalModel,
@@ -28,7 +28,7 @@ const MARCH: &str = "
     results[o] = sum * distance(a, b) / STEPS.0;";
 
 fn march_on_gpu(app: &mut App, camera: DVec3, segments: &[[f32; 6]]) -> Vec<f64> {
-    let group = ModelShader::bindings(app, camera).expect("the model can be bound");
+    let group = model_bindings(app, camera).expect("the model can be bound");
     let body = MARCH.replace("STEPS", &STEPS.to_string());
     let found = on_gpu_with(app, Some(&group), "import bevy_cumulus::model::model::sample_medium;", &body, segments);
     found.into_iter().map(|[depth]| f64::from(depth)).collect()

@@ -8,8 +8,9 @@ use bevy::{
     math::{DVec2, DVec3, DVec4},
     prelude::*,
 };
+use bevy_cumulus::testing::model_bindings;
 use bevy_cumulus::{
-    CloudsPlugin, ModelShader,
+    CloudsPlugin,
     prelude::*,
     reference::{
         field::{LayerSides, LocalModel, ModelTextures},
@@ -228,7 +229,7 @@ fn gpu_and_cpu_agree_on_100_000_points_to_the_texture_filters_precision() {
         }
         app.insert_resource(model.clone()).insert_resource(CloudClock { seconds, speed: 0.0 });
         let points: Vec<[f32; 4]> = (0..40_000).map(|_| point(&mut rng, &model)).collect();
-        let group = ModelShader::bindings(&app, camera).expect("the model can be bound");
+        let group = model_bindings(&app, camera).expect("the model can be bound");
         let found: Vec<[f32; 4]> = on_gpu_with(&mut app, Some(&group), IMPORTS, ASK, &points);
         let sky = sky(&app);
         assert_eq!((sky.model(), sky.seconds()), (&model, seconds));

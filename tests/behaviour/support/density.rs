@@ -1,7 +1,8 @@
 //! The built-in model asked for densities and their bounds, without a camera.
 
 use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::{ModelShader, prelude::*, textures::CloudTextureStatus};
+use bevy_cumulus::testing::model_bindings;
+use bevy_cumulus::{prelude::*, textures::CloudTextureStatus};
 use rand::{Rng, rngs::StdRng};
 
 use super::{
@@ -32,7 +33,7 @@ pub const ASK: &str = "
 pub fn model_app() -> App {
     let mut app = clouds_app();
     run_until(&mut app, "the textures are baked", 600, |app| {
-        !app.world().resource::<CloudTextureStatus>().baking && ModelShader::bindings(app, DVec3::ZERO).is_ok()
+        !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
     });
     // So that the baking that the small sizes ask for has begun, and ended.
     run_updates(&mut app, 3);
@@ -43,7 +44,7 @@ pub fn model_app() -> App {
 pub fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer> {
     app.insert_resource(model.clone());
     let camera = DVec3::new(12_345.0, 10.0, -6789.0);
-    let group = ModelShader::bindings(app, camera).expect("the model can be bound");
+    let group = model_bindings(app, camera).expect("the model can be bound");
     on_gpu_with(app, Some(&group), IMPORTS, ASK, questions)
 }
 

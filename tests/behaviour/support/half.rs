@@ -5,10 +5,9 @@
 /// # Panics
 /// Where it is infinite or NaN: nothing of ours stores that.
 pub fn from_half(bits: u16) -> f64 {
-    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f64::from(bits & 1023) / 1024.0);
-    assert!(exponent < 31, "a half that is infinite or NaN: {bits:#x}");
-    sign * if exponent == 0 { fraction * 2_f64.powi(-14) } else { (1.0 + fraction) * 2_f64.powi(exponent - 15) }
+    let half = ::half::f16::from_bits(bits);
+    assert!(half.is_finite(), "a half that is infinite or NaN: {bits:#x}");
+    half.to_f64()
 }
 
 /// The largest difference between two lists, relative to the second's value or to `floor`, whichever is larger.

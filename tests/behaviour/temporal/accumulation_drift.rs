@@ -5,17 +5,16 @@ use bevy::{
     render::{
         RenderApp,
         render_resource::{
-            BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer, BufferDescriptor,
-            BufferUsages, CachedPipelineState, CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline,
-            ComputePipelineDescriptor, Extent3d, Origin3d, Pipeline, PipelineCache, ShaderStages, StorageTextureAccess,
-            TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, Texture, TextureDescriptor,
-            TextureDimension, TextureFormat, TextureSampleType, TextureUsages, TextureViewDescriptor,
+            BindGroup, BindGroupEntries, Buffer, BufferDescriptor, BufferInitDescriptor, BufferUsages,
+            CachedPipelineState, CommandEncoderDescriptor, ComputePassDescriptor, ComputePipeline, Extent3d, Origin3d,
+            Pipeline, PipelineCache, TexelCopyBufferInfo, TexelCopyBufferLayout, TexelCopyTextureInfo, Texture,
+            TextureDescriptor, TextureDimension, TextureFormat, TextureUsages, TextureViewDescriptor,
             TextureViewDimension,
-            binding_types::{texture_2d, texture_2d_array, texture_storage_2d, uniform_buffer_sized},
         },
         renderer::{RenderDevice, RenderQueue},
     },
 };
+use bevy_cumulus::testing::Accumulation;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::support::{
@@ -31,37 +30,10 @@ const LAYERS: u32 = WINDOW as u32 + 1;
 const CHANNELS: usize = 4 * TEXELS;
 /// As `pack_marched` of `held.wesl` puts it: nothing has changed for 255 frames.
 const UNCHANGED: u32 = 255 << 24;
-/// Bytes of `Held`: 16 matrices, 16 times three vectors, 9 winds and one vector more.
-const HELD_BYTES: u64 = 16 * (64 + 3 * 16) + 9 * 16 + 16;
-
-/// Byte offset of a member of `CloudFrame`, and the struct's size. Its members are matrices and vectors of four.
-fn place_of(member: &str) -> (usize, usize) {
-    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/src/render/frame.wesl");
-    let source = std::fs::read_to_string(path).expect("the shader is there");
-    let body = source.split("struct CloudFrame {").nth(1).expect("it has the struct");
-    let body = body.split('}').next().expect("the struct ends");
-    let (mut offset, mut found) = (0, None);
-    for line in body.lines().map(str::trim).filter(|l| !l.is_empty() && !l.starts_with("//")) {
-        let (name, kind) = line.split_once(':').expect("a member has a type");
-        if name == member {
-            found = Some(offset);
-        }
-        offset += match kind.trim().trim_end_matches(',') {
-            "mat4x4<f32>" => 64,
-            "vec4<f32>" | "vec4<u32>" => 16,
-            "array<vec4<f32>, 4>" => 64,
-            other => panic!("a member of type {other}"),
-        };
-    }
-    (found.unwrap_or_else(|| panic!("CloudFrame has no {member}")), offset)
-}
-
 /// The stage with its textures, outside the renderer.
-struct Accumulation {
+struct Window {
     pipeline: ComputePipeline,
     uniform: Buffer,
-    /// Offsets of `size` and `layers` in the uniform.
-    places: [usize; 2],
     frames: Texture,
     sums: [Texture; 2],
     groups: [BindGroup; 2],
@@ -70,34 +42,9 @@ struct Accumulation {
     held: u32,
 }
 
-fn layouts() -> [BindGroupLayoutDescriptor; 2] {
-    let unfiltered = TextureSampleType::Float { filterable: false };
-    let own = BindGroupLayoutEntries::sequential(
-        ShaderStages::COMPUTE,
-        (
-            uniform_buffer_sized(false, None),
-            texture_2d_array(unfiltered),
-            texture_2d(unfiltered),
-            texture_storage_2d(TextureFormat::Rgba32Float, StorageTextureAccess::WriteOnly),
-            texture_2d_array(TextureSampleType::Uint),
-            uniform_buffer_sized(false, None),
-        ),
-    );
-    [BindGroupLayoutDescriptor::new("test nothing", &[]), BindGroupLayoutDescriptor::new("test accumulation", &own)]
-}
-
-fn pipeline(app: &mut App) -> ComputePipeline {
-    let shader =
-        app.world().resource::<AssetServer>().load("embedded://bevy_cumulus/render/accumulate/accumulate.wesl");
-    let [empty, own] = layouts();
-    let descriptor = ComputePipelineDescriptor {
-        label: Some("test accumulation".into()),
-        layout: vec![empty.clone(), empty, own],
-        shader,
-        entry_point: Some("main".into()),
-        ..default()
-    };
-    let id = app.sub_app(RenderApp).world().resource::<PipelineCache>().queue_compute_pipeline(descriptor);
+fn compile(app: &mut App, stage: &Accumulation) -> ComputePipeline {
+    let cache = app.sub_app(RenderApp).world().resource::<PipelineCache>();
+    let id = cache.queue_compute_pipeline(stage.pipeline.clone());
     let mut pipeline = None;
     run_until(app, "the accumulation stage compiles", 100, |app| {
         let cache = app.sub_app(RenderApp).world().resource::<PipelineCache>();
@@ -109,9 +56,10 @@ fn pipeline(app: &mut App) -> ComputePipeline {
     pipeline.expect("it was waited for")
 }
 
-impl Accumulation {
+impl Window {
     fn new(app: &mut App) -> Self {
-        let pipeline = pipeline(app);
+        let stage = Accumulation::new(app).expect("clouds can be drawn");
+        let pipeline = compile(app, &stage);
         let world = app.sub_app(RenderApp).world();
         let (device, cache) = (world.resource::<RenderDevice>(), world.resource::<PipelineCache>());
         let texture = |format, layers| {
@@ -129,19 +77,12 @@ impl Accumulation {
                 view_formats: &[],
             })
         };
-        let uniform = |size| {
-            device.create_buffer(&BufferDescriptor {
-                label: Some("test frame"),
-                size,
-                usage: BufferUsages::UNIFORM | BufferUsages::COPY_DST,
-                mapped_at_creation: false,
-            })
+        let uniform = |contents: &[u8]| {
+            let usage = BufferUsages::UNIFORM | BufferUsages::COPY_DST;
+            device.create_buffer_with_data(&BufferInitDescriptor { label: Some("test uniform"), contents, usage })
         };
-        let (uniform, held) = (uniform(place_of("size").1 as u64), uniform(HELD_BYTES));
-        // No held frame's exposure is another.
-        let mut terms = [[0.0_f32; 4]; 16];
-        terms.iter_mut().for_each(|term| term[3] = 1.0);
-        world.resource::<RenderQueue>().write_buffer(&held, 16 * 64, bytemuck::cast_slice(&terms));
+        let history = uniform(&Accumulation::still_history_uniform());
+        let uniform = uniform(&Accumulation::frame_uniform(SIZE, 0, [0; 4]));
         let frames = texture(TextureFormat::Rgba16Float, LAYERS);
         let sums = [0, 1].map(|_| texture(TextureFormat::Rgba32Float, 1));
         let marched = texture(TextureFormat::R32Uint, LAYERS);
@@ -152,7 +93,7 @@ impl Accumulation {
         let array = TextureViewDescriptor { dimension: Some(TextureViewDimension::D2Array), ..default() };
         let (all, marched) = (frames.create_view(&array), marched.create_view(&array));
         let views = sums.each_ref().map(|t| t.create_view(&TextureViewDescriptor::default()));
-        let [empty, own] = layouts().map(|l| cache.get_bind_group_layout(&l));
+        let [empty, own] = [&stage.empty, &stage.layout].map(|layout| cache.get_bind_group_layout(layout));
         let groups = [0, 1].map(|parity| {
             let entries = BindGroupEntries::sequential((
                 uniform.as_entire_binding(),
@@ -160,13 +101,12 @@ impl Accumulation {
                 &views[parity],
                 &views[1 - parity],
                 &marched,
-                held.as_entire_binding(),
+                history.as_entire_binding(),
             ));
             device.create_bind_group("test accumulation", &own, &entries)
         });
         let empty = device.create_bind_group("test nothing", &empty, &[]);
-        let places = ["size", "layers"].map(|member| place_of(member).0);
-        Self { pipeline, uniform, places, frames, sums, groups, empty, index: 0, held: 0 }
+        Self { pipeline, uniform, frames, sums, groups, empty, index: 0, held: 0 }
     }
 
     /// Adds one frame, as the renderer would.
@@ -177,10 +117,8 @@ impl Accumulation {
         let texels =
             TexelCopyTextureInfo { origin: Origin3d { z: layer, ..Origin3d::ZERO }, ..self.frames.as_image_copy() };
         write(queue, texels, 8, bytemuck::cast_slice(frame));
-        let values = [[SIZE.x, SIZE.y, 1, self.index & 255], [layer, (self.index + 1) % LAYERS, LAYERS, self.held]];
-        for (place, value) in self.places.iter().zip(values) {
-            queue.write_buffer(&self.uniform, *place as u64, bytemuck::cast_slice(&value));
-        }
+        let layers = [layer, (self.index + 1) % LAYERS, LAYERS, self.held];
+        queue.write_buffer(&self.uniform, 0, &Accumulation::frame_uniform(SIZE, self.index, layers));
         let mut encoder = device.create_command_encoder(&CommandEncoderDescriptor::default());
         {
             let mut pass = encoder.begin_compute_pass(&ComputePassDescriptor::default());
@@ -237,7 +175,7 @@ fn frame(rng: &mut StdRng, values: std::ops::RangeInclusive<u16>) -> Vec<u16> {
 
 /// Frames made one after the other, and the latest ones as numbers.
 struct Film {
-    stage: Accumulation,
+    stage: Window,
     recent: Vec<Vec<f64>>,
 }
 
@@ -273,7 +211,7 @@ const RECENT: usize = 256 + WINDOW;
 #[test]
 fn ten_thousand_frames_do_not_drift() {
     let mut app = clouds_app();
-    let stage = Accumulation::new(&mut app);
+    let stage = Window::new(&mut app);
     let mut film = Film { stage, recent: Vec::new() };
     let mut rng = StdRng::seed_from_u64(70);
     let (mut steady, mut wild) = (0.0_f64, 0.0_f64);
@@ -304,7 +242,7 @@ fn ten_thousand_frames_do_not_drift() {
 #[test]
 fn a_spoilt_sum_is_whole_again_after_256_frames() {
     let mut app = clouds_app();
-    let stage = Accumulation::new(&mut app);
+    let stage = Window::new(&mut app);
     let mut film = Film { stage, recent: Vec::new() };
     let mut rng = StdRng::seed_from_u64(71);
     for _ in 0..100 {

@@ -8,10 +8,11 @@ use bevy::{
     prelude::*,
     render::render_resource::TextureFormat,
 };
+use bevy_cumulus::testing::textures as captured;
 use bevy_cumulus::{
     CloudFrame,
     prelude::*,
-    textures::{CloudTextureSlot, capture, n_rooks::n_rooks},
+    textures::{CloudTextureSlot, n_rooks::n_rooks},
 };
 
 use crate::support::{
@@ -126,7 +127,7 @@ fn rounding_to_half_floats_costs_less_than_a_thousandth() {
     // Unshadowed: no frame's steps change what it sees, only its place in each pixel does.
     let (mut app, view) = slab_app(EXTINCTION, Vec3::new(0.3, 1.0, 0.2));
     until_drawn(&mut app);
-    let noise = capture::read(&app, CloudTextureSlot::BlueNoise, 0).expect("it is there before clouds are drawn");
+    let noise = captured::read(&app, CloudTextureSlot::BlueNoise, 0).expect("it is there before clouds are drawn");
     for window in [1, 5, 8, 16] {
         let held = CloudQuality { offsets: true, temporal: TemporalMode::SlidingWindow, window, ..exact_march(170.0) };
         app.insert_resource(held);

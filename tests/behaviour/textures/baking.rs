@@ -4,13 +4,11 @@ mod content;
 mod slots;
 
 use bevy::prelude::*;
+use bevy_cumulus::testing::textures::{self as captured, Captured};
 use bevy_cumulus::{
     CloudsPlugin,
     settings::CloudTextures,
-    textures::{
-        CloudTextureSlot, CloudTextureStatus,
-        capture::{self, Captured},
-    },
+    textures::{CloudTextureSlot, CloudTextureStatus},
 };
 
 use crate::support::gpu;
@@ -47,11 +45,11 @@ fn bake(app: &mut App) {
     // What was changed just now counts from the next frame on.
     gpu::run_updates(app, 2);
     gpu::run_until(app, "the bake", LIMIT, |app| !app.world().resource::<CloudTextureStatus>().baking);
-    assert!(capture::generation(app).1, "baking is over, but a texture is missing");
+    assert!(captured::generation(app).1, "baking is over, but a texture is missing");
 }
 
 fn read(app: &App, slot: CloudTextureSlot, level: u32) -> Captured {
-    capture::read(app, slot, level).unwrap()
+    captured::read(app, slot, level).unwrap()
 }
 
 fn channel(captured: &Captured, channel: usize) -> Vec<f32> {
@@ -82,10 +80,10 @@ fn a_seed_gives_the_same_sky_again_and_another_seed_another() {
 fn a_changed_parameter_bakes_only_what_it_concerns() {
     let mut app = baked(SMALL);
     let before = read(&app, CloudTextureSlot::Wisp, 0);
-    let (generation, _) = capture::generation(&app);
+    let (generation, _) = captured::generation(&app);
     app.world_mut().resource_mut::<CloudTextures>().billow_cells = 8;
     bake(&mut app);
-    assert_eq!(capture::generation(&app).0, generation + 1);
+    assert_eq!(captured::generation(&app).0, generation + 1);
     assert!(before == read(&app, CloudTextureSlot::Wisp, 0));
 }
 

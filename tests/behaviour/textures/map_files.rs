@@ -1,7 +1,8 @@
 //! Layers' maps from files of each kind, hot-reloaded, and by channel.
 
 use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::{ModelShader, prelude::*, settings::MapChannels, textures::CloudTextureStatus};
+use bevy_cumulus::testing::model_bindings;
+use bevy_cumulus::{prelude::*, settings::MapChannels, textures::CloudTextureStatus};
 use image::{ImageFormat, Rgba32FImage, RgbaImage};
 
 use crate::support::{
@@ -18,7 +19,7 @@ use crate::{
 fn app(folder: &Folder) -> App {
     let mut app = clouds_app_in(folder);
     run_until(&mut app, "the textures are baked", 600, |app| {
-        !app.world().resource::<CloudTextureStatus>().baking && ModelShader::bindings(app, DVec3::ZERO).is_ok()
+        !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
     });
     app
 }

@@ -16,7 +16,7 @@ pub const PATIENCE: Duration = Duration::from_secs(300);
 pub const SCREEN: [usize; 2] = [960, 540];
 
 pub fn binary(name: &str) -> PathBuf {
-    let path = headless::binary().with_file_name(format!("{name}{}", std::env::consts::EXE_SUFFIX));
+    let path = program::binary().with_file_name(format!("{name}{}", std::env::consts::EXE_SUFFIX));
     assert!(path.is_file(), "{} is missing: cargo build --features inspector --examples makes it", path.display());
     path
 }

@@ -1,13 +1,10 @@
 //! What is in the baked textures.
 
 use bevy::prelude::*;
+use bevy_cumulus::testing::textures::{self as captured, Captured};
 use bevy_cumulus::{
     settings::CloudTextures,
-    textures::{
-        CloudTextureSlot,
-        capture::{self, Captured},
-        vertical_profile,
-    },
+    textures::{CloudTextureSlot, vertical_profile},
 };
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
@@ -146,7 +143,7 @@ fn bilinear(level: &Captured, uv: Vec2, channel: usize) -> f32 {
 
 /// Random places: no finer or equal level may exceed the bound of a level, in `channel`, within half of its texel.
 pub fn assert_bounds(app: &App, slot: CloudTextureSlot, channel: usize) {
-    let levels: Vec<Captured> = (0..capture::levels(app, slot)).map(|level| read(app, slot, level)).collect();
+    let levels: Vec<Captured> = (0..captured::levels(app, slot)).map(|level| read(app, slot, level)).collect();
     assert_eq!(levels.last().unwrap().size, UVec3::ONE, "{slot}: the pyramid ends at one texel");
     let mut random = StdRng::seed_from_u64(7);
     let mut tight = 0;
@@ -189,7 +186,7 @@ fn the_bound_check_sees_a_bound_too_low() {
 fn volumes_have_mips_that_average() {
     let app = baked(SMALL);
     let slot = CloudTextureSlot::Billow;
-    assert_eq!(capture::levels(&app, slot), 6);
+    assert_eq!(captured::levels(&app, slot), 6);
     let (fine, coarse) = (read(&app, slot, 0), read(&app, slot, 1));
     assert_eq!(coarse.size, UVec3::splat(16));
     for p in [IVec3::new(0, 0, 0), IVec3::new(3, 15, 9), IVec3::new(15, 15, 15)] {

@@ -16,9 +16,10 @@ use bevy::{
         settings::RenderCreation,
     },
 };
+use bevy_cumulus::testing::textures as captured;
 use bevy_cumulus::{
     settings::CloudTextureSlots,
-    textures::{CloudTextureError, CloudTextureFault, CloudTextureSlot, capture},
+    textures::{CloudTextureError, CloudTextureFault, CloudTextureSlot},
 };
 
 use super::{SMALL, bake, baked, channel, content::assert_bounds, read};
@@ -32,7 +33,7 @@ fn a_lost_device_is_baked_for_again() {
     bake(&mut app);
     let slots = [CloudTextureSlot::Wisp, CloudTextureSlot::Billow, CloudTextureSlot::Coverage];
     let before = slots.map(|slot| read(&app, slot, 0));
-    let (generation, _) = capture::generation(&app);
+    let (generation, _) = captured::generation(&app);
     app.insert_resource(RenderErrorHandler(|_, _, _| RenderErrorPolicy::Recover(RenderCreation::Automatic(default()))));
     let device = app.world().resource::<RenderDevice>().wgpu_device().clone();
     device.destroy();
@@ -40,12 +41,12 @@ fn a_lost_device_is_baked_for_again() {
     let _ = device.poll(PollType::Poll);
     // The adapter is asked for a device on another thread, which can take a while.
     let start = Instant::now();
-    while capture::generation(&app).0 == generation && start.elapsed() < Duration::from_secs(60) {
+    while captured::generation(&app).0 == generation && start.elapsed() < Duration::from_secs(60) {
         app.update();
         std::thread::sleep(Duration::from_millis(20));
     }
     bake(&mut app);
-    assert!(capture::generation(&app).0 > generation, "views of the lost device pass for current");
+    assert!(captured::generation(&app).0 > generation, "views of the lost device pass for current");
     for (slot, before) in slots.iter().zip(&before) {
         assert!(*before == read(&app, *slot, 0), "{slot} differs on the new device");
     }
@@ -188,7 +189,7 @@ fn a_users_map_of_any_size_becomes_a_pyramid_and_follows_its_changes() {
         assert_bounds(&app, CloudTextureSlot::Coverage, 1);
 
         let mean = channel(&shown, 0).iter().sum::<f32>() / shown.texels.len() as f32;
-        let last = capture::levels(&app, CloudTextureSlot::Coverage) - 1;
+        let last = captured::levels(&app, CloudTextureSlot::Coverage) - 1;
         let top = read(&app, CloudTextureSlot::Coverage, last).texels[0];
         assert!((top[0] - mean).abs() < 2e-3 && top[1] == 1.0, "{top:?}, mean {mean}");
 
@@ -216,13 +217,13 @@ fn an_image_that_turns_bad_in_place_leaves_the_good_one() {
 #[test]
 fn a_png_from_disk_fills_a_slot() {
     let mut app = baked(SMALL);
-    let (generation, _) = capture::generation(&app);
+    let (generation, _) = captured::generation(&app);
     let data = |settings: &mut ImageLoaderSettings| settings.is_srgb = false;
     let server = app.world().resource::<AssetServer>();
     let handle = server.load_builder().with_settings(data).load("textures/blue_noise.png");
     app.world_mut().resource_mut::<CloudTextureSlots>().type_map = Some(handle);
     bake(&mut app);
-    assert_eq!(capture::generation(&app).0, generation + 1);
+    assert_eq!(captured::generation(&app).0, generation + 1);
     let shown = read(&app, CloudTextureSlot::TypeMap, 0);
     let file = image::open(assets().join("textures/blue_noise.png")).unwrap().to_rgba8();
     assert_eq!((shown.size.x, shown.size.y), file.dimensions());

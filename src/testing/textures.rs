@@ -1,4 +1,4 @@
-//! Reads textures back to the CPU, for tests and tools. Not part of the public interface.
+//! Contents of the baked textures, read back to the CPU.
 
 use bevy::{
     prelude::*,
@@ -13,7 +13,7 @@ use bevy::{
     },
 };
 
-use super::{CloudTextureSlot, CloudTextureViews, bake::Bakery, texel::decoder};
+use crate::textures::{Bakery, CloudTextureSlot, CloudTextureViews, decoder};
 
 /// One level of a texture, in the order x, y, z.
 #[derive(Clone, PartialEq, Debug)]
