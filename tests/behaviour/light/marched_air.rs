@@ -4,33 +4,23 @@ use bevy::{
     pbr::{AtmosphereMode, AtmosphereSettings},
     prelude::*,
 };
-use bevy_cumulus::{ModelShader, prelude::*};
+use bevy_cumulus::prelude::*;
 
 use crate::support::{
-    app::{Sky, View, cloud_pixels, clouds_app_with, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, View, cloud_pixels, spawn_sun, spawn_view, until_drawn},
     gpu::webgpu_limits,
     scene::{exact, settle},
+    shared::SharedApp,
+    uniform_slab::UniformSlab,
 };
 
 const SIZE: UVec2 = UVec2::new(24, 16);
 const TOP: f32 = 1500.0;
 
 /// An opaque deck of this albedo up to [`TOP`], under Bevy's atmosphere.
-fn deck(albedo: f32, lighting: CloudLighting) -> (App, View) {
-    let model = ModelShader(format!(
-        "import package::model::{{medium::{{Medium, empty_medium}}, planet::altitude}};
-        fn model_bounds() -> vec2<f32> {{ return vec2(500.0, {TOP:?}); }}
-        fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{ return 1.0; }}
-        fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
-            let h = altitude(p, 6360000.0);
-            if h < 500.0 || h > {TOP:?} {{ return empty_medium(); }}
-            return Medium(1.0, 0.05, vec3({albedo:?}), 0.5, vec2(h - 500.0, {TOP:?} - h), vec4(1.0, 0.0, 0.0, 0.0));
-        }}"
-    ));
-    let insert = move |app: &mut App| {
-        app.insert_resource(model.clone());
-    };
-    let mut app = clouds_app_with((insert, CloudsPlugin));
+fn deck(albedo: f32, lighting: CloudLighting) -> (SharedApp, View) {
+    let slab = UniformSlab { albedo: Vec3::splat(albedo), ..UniformSlab::new(500.0, TOP, 0.05) };
+    let mut app = slab.app();
     app.insert_resource(CloudQuality { step: 20.0, ..exact(MarchResolution::Full) }).insert_resource(lighting);
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let view = spawn_view(&mut app, SIZE, Transform::default(), Sky::Atmosphere);

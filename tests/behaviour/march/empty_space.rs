@@ -7,6 +7,7 @@ use crate::support::{
     app::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
     gpu::run_updates,
     scene::{exact, settle, spawn_linear, steps},
+    shared::SharedApp,
     slab::{exact_march, slab_app},
 };
 
@@ -17,7 +18,7 @@ fn mean(values: impl Iterator<Item = f32> + Clone) -> f32 {
 }
 
 /// The built-in clouds from the ground, each step where it always is.
-fn built_in() -> (App, View) {
+fn built_in() -> (SharedApp, View) {
     let mut app = clouds_app();
     // A map whose texels are not as wide as the gaps between clouds: else nothing is known to be empty.
     app.insert_resource(CloudTextures { volume_size: 32, map_size: 512, ..default() });

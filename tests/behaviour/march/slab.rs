@@ -7,15 +7,16 @@
 use std::path::Path;
 
 use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::{ModelShader, prelude::*};
+use bevy_cumulus::prelude::*;
 
 use crate::support::{
-    app::{Sky, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, cloud_pixels, new_clouds_app, spawn_sun, spawn_view, until_drawn},
     gpu::{assert_shaders_compile, run_until, run_updates},
     slab::{
-        LEAST, SIZE, STORED, directions, exact_march, full_radiance, gathered, length_in_slab, looking, plain_light,
-        seen_from, slab, slab_app, spans,
+        BOTTOM, LEAST, SIZE, STORED, TOP, directions, exact_march, full_radiance, gathered, length_in_slab, looking,
+        plain_light, seen_from, slab_app, spans,
     },
+    uniform_slab::slab_text,
 };
 
 /// The viewpoints of the tests: below, inside and above the slab.
@@ -170,7 +171,7 @@ fn long_steps_keep_energy_only_where_they_are_integrated() {
 
 #[test]
 fn a_model_may_come_after_the_plugin_and_change() {
-    let mut app = clouds_app();
+    let mut app = new_clouds_app();
     app.insert_resource(plain_light()).insert_resource(exact_march(170.0));
     spawn_sun(&mut app, Vec3::NEG_Y);
     let view = spawn_view(&mut app, SIZE, looking(10.0, 60.0), Sky::Black);
@@ -183,7 +184,7 @@ fn a_model_may_come_after_the_plugin_and_change() {
     };
     for extinction in [4e-4, 9e-4] {
         // At once the first time, before the built-in model has loaded.
-        app.insert_resource(ModelShader(slab(extinction)));
+        app.insert_resource(slab_text(BOTTOM as f32, TOP as f32, extinction as f32));
         run_until(&mut app, &format!("the slab of {extinction}/m is drawn"), 60, |app| {
             assert_shaders_compile(app);
             app.world().resource::<CloudStatus>().is_ready() && matches(app, extinction)

@@ -16,6 +16,7 @@ use crate::support::{
     gpu::run_updates,
     half::from_half,
     scene::{exact, slab_app, spawn_box, spawn_linear},
+    shared::SharedApp,
 };
 
 const BOTTOM: f32 = 1500.0;
@@ -66,7 +67,7 @@ fn a_ray_that_runs_out_of_steps_still_reaches_its_end() {
 
 /// A camera on a uniform slab that shows its rays' steps, and the newest frame as it is marched.
 struct Counted {
-    app: App,
+    app: SharedApp,
     view: View,
     frame: Handle<Image>,
 }

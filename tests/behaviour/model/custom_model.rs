@@ -1,14 +1,15 @@
 //! A model of one's own: taken, refused with its line, and taken again.
 
 use bevy::prelude::*;
-use bevy_cumulus::{ModelShader, ModelShaderError, prelude::*};
+use bevy_cumulus::{CloudsPlugin, ModelShader, ModelShaderError, prelude::*};
 use rand::{SeedableRng, rngs::StdRng};
 
 use crate::support::{
-    app::until_drawn,
-    density::{Question, ask, model_app, question},
+    app::{new_clouds_app, new_clouds_app_with, spawn_sun, until_drawn},
+    density::{Question, ask, question, until_baked},
     gpu::{assert_shaders_compile, run_updates, times_logged},
-    scene::{linear_pixels, settle, slab, slab_app, spawn_linear},
+    scene::{exact, linear_pixels, settle, spawn_linear},
+    uniform_slab::slab_text,
 };
 
 #[derive(Resource, Default)]
@@ -18,16 +19,28 @@ fn hear(mut errors: MessageReader<ModelShaderError>, mut heard: ResMut<Heard>) {
     heard.0.extend(errors.read().cloned());
 }
 
+/// An app with this model, in place before the built-in one is registered.
+fn app_of(model: &str) -> App {
+    let model = ModelShader(model.to_owned());
+    let insert = move |app: &mut App| {
+        app.insert_resource(model.clone());
+    };
+    let mut app = new_clouds_app_with((insert, CloudsPlugin));
+    app.insert_resource(exact(MarchResolution::Full));
+    spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
+    app
+}
+
 #[test]
 fn a_model_that_does_not_compile_leaves_the_last_good_one() {
-    let mut app = slab_app(1500.0, 2500.0, 0.0006);
+    let good = slab_text(1500.0, 2500.0, 0.0006).0;
+    let mut app = app_of(&good);
     app.init_resource::<Heard>().add_systems(Update, hear);
     let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()));
     let view = spawn_linear(&mut app, UVec2::new(12, 8), up);
     until_drawn(&mut app);
     settle(&mut app);
     let picture = linear_pixels(&app, &view);
-    let good = slab(1500.0, 2500.0, 0.0006).0;
     // A type, a name, and a sign that is missing: on lines of their own.
     for (spoilt, line) in [
         (good.replace("return 1.0;", "\n\nreturn 1u;"), 5),
@@ -52,7 +65,7 @@ fn a_model_that_does_not_compile_leaves_the_last_good_one() {
         assert!(told.len() == 1 && told[0].line == Some(line), "{told:?}");
     }
     // A good one is taken again, and the first of them, too.
-    app.insert_resource(slab(1500.0, 2500.0, 0.003));
+    app.insert_resource(slab_text(1500.0, 2500.0, 0.003));
     settle(&mut app);
     until_drawn(&mut app);
     settle(&mut app);
@@ -66,7 +79,7 @@ fn a_model_that_does_not_compile_leaves_the_last_good_one() {
 
 #[test]
 fn the_built_in_model_is_back_when_the_resource_is_removed() {
-    let mut app = slab_app(1500.0, 2500.0, 0.0006);
+    let mut app = app_of(&slab_text(1500.0, 2500.0, 0.0006).0);
     app.world_mut().remove_resource::<ModelShader>();
     app.insert_resource(CloudModel { coverage: 0.7, ..default() });
     let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()));
@@ -79,17 +92,18 @@ fn the_built_in_model_is_back_when_the_resource_is_removed() {
     };
     // Removed before it was ever seen.
     let built_in = picture(&mut app);
-    app.insert_resource(slab(1500.0, 2500.0, 0.0006));
+    app.insert_resource(slab_text(1500.0, 2500.0, 0.0006));
     assert!(picture(&mut app) != built_in, "the model is not replaced");
     app.world_mut().remove_resource::<ModelShader>();
     assert!(picture(&mut app) == built_in, "the built-in model is not back");
-    app.insert_resource(slab(1500.0, 2500.0, 0.003));
+    app.insert_resource(slab_text(1500.0, 2500.0, 0.003));
     assert!(picture(&mut app) != built_in, "the model is not replaced again");
 }
 
 #[test]
 fn the_examples_rings_keep_a_models_promises() {
-    let mut app = model_app();
+    let mut app = new_clouds_app();
+    until_baked(&mut app);
     app.insert_resource(ModelShader(include_str!("../../../examples/custom_model/rings.wesl").to_owned()));
     run_updates(&mut app, 3);
     let model = CloudModel { bottom: 620.0, top: 4580.0, map_scale: 5000.0, ..default() };

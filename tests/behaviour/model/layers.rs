@@ -11,6 +11,7 @@ use crate::support::{
     density::{Answer, Question, ask, at, model_app, question},
     gpu::{run_until, run_updates, times_logged},
     scene::{exact, settle, spawn_linear, steps},
+    shared::SharedApp,
 };
 
 /// A small map of this cover (oktas).
@@ -298,7 +299,7 @@ fn nothing_jumps_where_offsets_wrap_or_after_weeks() {
 const SIZE: UVec2 = UVec2::new(12, 8);
 
 /// An app without the thesis's layer, and with a camera on the ground that looks up.
-fn above_us(layers: &[CloudLayer]) -> (App, View) {
+fn above_us(layers: &[CloudLayer]) -> (SharedApp, View) {
     let mut app = clouds_app();
     app.insert_resource(exact(MarchResolution::Full))
         .insert_resource(CloudModel { enabled: false, ..default() })
@@ -346,7 +347,7 @@ fn an_empty_gap_between_decks_costs_next_to_nothing() {
 }
 
 /// An app whose camera on the ground looks at the horizon; low clouds end at 40 km.
-fn far_away(layers: &[CloudLayer]) -> (App, View) {
+fn far_away(layers: &[CloudLayer]) -> (SharedApp, View) {
     let (mut app, view) = above_us(layers);
     app.insert_resource(CloudQuality { max_distance: 40_000.0, ..exact(MarchResolution::Full) });
     let looking = Transform::from_xyz(0.0, 10.0, 0.0).looking_to(Vec3::new(0.0, 0.06, -1.0), Vec3::Y);

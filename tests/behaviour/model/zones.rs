@@ -7,6 +7,7 @@ use bevy_cumulus::{prelude::*, settings::Validate, textures::CloudTextureStatus}
 use crate::support::{
     app::{Sky, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
     gpu::{run_compute_with, run_until, run_updates, times_logged},
+    shared::SharedApp,
 };
 
 const ASK: &str = "
@@ -61,7 +62,7 @@ impl Ground {
     }
 }
 
-fn model_app(layered: bool) -> App {
+fn model_app(layered: bool) -> SharedApp {
     let mut app = clouds_app();
     // Cloud nearly everywhere at this height, and no lean of tops that shifts it.
     let model =

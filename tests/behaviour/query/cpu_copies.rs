@@ -17,7 +17,7 @@ use bevy_cumulus::{
 
 use super::{field_app, sky, small, until_current};
 use crate::support::{
-    app::{clouds_app, clouds_app_with, spawn_sun},
+    app::{new_clouds_app, new_clouds_app_with, spawn_sun},
     gpu::{run_until, run_updates},
 };
 
@@ -196,7 +196,7 @@ fn the_twin_follows_layers() {
 
 #[test]
 fn a_sky_of_layers_is_not_told_of_before_they_are_there() {
-    let mut app = clouds_app_with((CloudFieldPlugin, CloudsPlugin));
+    let mut app = new_clouds_app_with((CloudFieldPlugin, CloudsPlugin));
     app.insert_resource(small(1)).insert_resource(CloudLayers(vec![super::layers::storm()]));
     run_until(&mut app, "there is a sky", 900, |app| app.world().resource::<CloudField>().is_ready());
     let textures = sky(&app).textures().clone();
@@ -230,7 +230,7 @@ fn what_cannot_be_told_is_said() {
     app.world_mut().resource_mut::<CloudTextureSlots>().billow = None;
     until_current(&mut app);
     assert_eq!(error(&app), None);
-    app.insert_resource(crate::support::scene::slab(1000.0, 2000.0, 0.01));
+    app.insert_resource(crate::support::uniform_slab::slab_text(1000.0, 2000.0, 0.01));
     run_updates(&mut app, 1);
     assert_eq!(error(&app), Some(CloudFieldError::CustomModel));
     // Taking the resource away brings the built-in model back.
@@ -253,7 +253,7 @@ fn nothing_is_read_back_unless_asked_for() {
         };
         count(schedules.get(Render).unwrap()) + count(schedules.get(RenderGraph).unwrap())
     };
-    let mut without = clouds_app();
+    let mut without = new_clouds_app();
     run_updates(&mut without, 2);
     assert!(without.world().get_resource::<CloudField>().is_none());
     assert_eq!([systems(&without), systems(&field_app(small(1)))], [0, 2]);
@@ -261,7 +261,7 @@ fn nothing_is_read_back_unless_asked_for() {
 
 #[test]
 fn the_sky_comes_without_anyone_waiting_for_the_gpu() {
-    let mut app = clouds_app_with((CloudsPlugin, CloudFieldPlugin));
+    let mut app = new_clouds_app_with((CloudsPlugin, CloudFieldPlugin));
     app.insert_resource(small(1));
     let there = |app: &App| {
         let field = app.world().resource::<CloudField>();

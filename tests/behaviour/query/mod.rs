@@ -22,14 +22,14 @@ use bevy_cumulus::{
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::support::{
-    app::clouds_app_with,
+    app::new_clouds_app_with,
     evaluate::{U, on_gpu_with},
     gpu::{run_until, run_updates},
 };
 
 /// An app without a camera whose sky the CPU has.
 pub fn field_app(textures: CloudTextures) -> App {
-    let mut app = clouds_app_with((CloudFieldPlugin, CloudsPlugin));
+    let mut app = new_clouds_app_with((CloudFieldPlugin, CloudsPlugin));
     app.insert_resource(textures);
     until_current(&mut app);
     app

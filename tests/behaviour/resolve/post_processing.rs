@@ -13,6 +13,7 @@ use crate::support::{
     app::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
     gpu::run_updates,
     scene::{CLEAR, linear_pixels, noisy, settle, spawn_linear},
+    shared::SharedApp,
     temporal_modes::{HELD, in_mode},
 };
 
@@ -20,7 +21,7 @@ const SIZE: UVec2 = UVec2::new(48, 32);
 const ORDERS: [CloudOrder; 2] = [CloudOrder::Sorted, CloudOrder::AfterTransparent];
 
 /// The built-in clouds, a camera with an effect, and one without.
-fn pair(effect: impl Bundle) -> (App, [View; 2]) {
+fn pair(effect: impl Bundle) -> (SharedApp, [View; 2]) {
     let mut app = clouds_app();
     app.insert_resource(noisy());
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));

@@ -12,10 +12,11 @@ use bevy::{
 use bevy_cumulus::prelude::*;
 
 use crate::support::{
-    app::{cloud_pixels, clouds_app_with, read_image, spawn_sun, until_drawn},
+    app::{cloud_pixels, new_clouds_app_with, read_image, spawn_sun, until_drawn},
     gpu::run_updates,
     half::from_half,
-    scene::{CLEAR, exact, linear_pixels, settle, slab, slab_app, spawn_box, spawn_linear},
+    scene::{CLEAR, exact, linear_pixels, settle, slab_app, spawn_box, spawn_linear},
+    uniform_slab::slab_text,
 };
 
 const SIZE: UVec2 = UVec2::new(48, 32);
@@ -133,11 +134,11 @@ fn slant(k: usize) -> f32 {
 fn a_material_fades_by_the_clouds_before_it() {
     // In a fog without end, where transmittance is e^(−σd) (Beer–Lambert, thesis equation 2.2); then below a layer.
     const EXTINCTION: f32 = 0.002;
-    let fog = slab(-300.0, 3000.0, EXTINCTION);
+    let fog = slab_text(-300.0, 3000.0, EXTINCTION);
     let insert = move |app: &mut App| {
         app.insert_resource(fog.clone());
     };
-    let mut app = clouds_app_with((insert, CloudsPlugin, MaterialPlugin::<Faded>::default()));
+    let mut app = new_clouds_app_with((insert, CloudsPlugin, MaterialPlugin::<Faded>::default()));
     app.insert_resource(exact(MarchResolution::Full));
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     app.world().resource::<EmbeddedAssetRegistry>().insert_asset(

@@ -14,6 +14,7 @@ use crate::support::{
     app::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
     gpu::{headless_plugins, run_updates, times_logged},
     scene::{CLEAR, exact, linear_pixels, settle, slab_app, spawn_linear},
+    shared::SharedApp,
 };
 
 const SIZE: UVec2 = UVec2::new(24, 16);
@@ -22,7 +23,7 @@ fn looking_up() -> Transform {
     Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()))
 }
 
-fn above_one_camera() -> (App, View) {
+fn above_one_camera() -> (SharedApp, View) {
     let mut app = slab_app(1500.0, 2500.0, 0.0006);
     let view = spawn_linear(&mut app, SIZE, looking_up());
     until_drawn(&mut app);

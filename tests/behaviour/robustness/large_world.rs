@@ -6,6 +6,7 @@ use bevy_cumulus::{prelude::*, reference::planet::PLANET_RADIUS};
 use crate::support::{
     app::{Sky, View, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
     gpu::{run_updates, webgpu_limits},
+    shared::SharedApp,
 };
 
 const SIZE: UVec2 = UVec2::new(64, 36);
@@ -13,7 +14,7 @@ const WIND: f32 = 20.0;
 const LIGHT: Vec3 = Vec3::new(-0.4, -1.0, -0.3);
 
 struct World {
-    app: App,
+    app: SharedApp,
     view: View,
     sun: Entity,
 }

@@ -9,7 +9,7 @@ use bevy::{
 use bevy_cumulus::{prelude::*, textures::CloudTextureStatus};
 
 use crate::support::{
-    app::{Sky, clouds_app, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, new_clouds_app, spawn_sun, spawn_view, until_drawn},
     gpu::{pipelines_are_there, run_until, run_updates},
 };
 
@@ -76,7 +76,7 @@ fn frame(app: &mut App) -> f64 {
 
 #[test]
 fn no_setting_compiles_anything_or_takes_the_clouds_away() {
-    let mut app = clouds_app();
+    let mut app = new_clouds_app();
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let looking = Transform::from_xyz(0.0, 10.0, 0.0).looking_to(Vec3::new(0.0, 0.4, -1.0), Vec3::Y);
     spawn_view(&mut app, UVec2::new(32, 18), looking, Sky::Black);

@@ -11,7 +11,7 @@ use bevy::{
 
 use bevy_cumulus::prelude::*;
 
-use crate::support::app::{Sky, clouds_app_with, spawn_sun, spawn_view, until_drawn};
+use crate::support::app::{Sky, new_clouds_app_with, spawn_sun, spawn_view, until_drawn};
 
 const OURS: &str = "bevy_cumulus::";
 /// Systems of others that hold the whole world, which conflicts with all that runs beside them: Bevy's sync points, and
@@ -20,7 +20,7 @@ const WHOLE_WORLD: [&str; 2] = ["bevy_ecs::apply_deferred", "bevy_egui::"];
 
 /// An app that draws, with all of our plugins.
 fn drawn() -> App {
-    let mut app = clouds_app_with((
+    let mut app = new_clouds_app_with((
         CloudsPlugin,
         CloudFieldPlugin,
         #[cfg(feature = "inspector")]

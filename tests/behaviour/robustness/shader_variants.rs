@@ -18,7 +18,7 @@ use bevy::{
 use bevy_cumulus::prelude::*;
 
 use crate::support::{
-    app::{Sky, View, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, View, cloud_pixels, new_clouds_app, spawn_sun, spawn_view, until_drawn},
     gpu::{run_updates, webgpu_limits},
 };
 
@@ -139,7 +139,7 @@ fn spawn_cases(app: &mut App) -> Vec<Case> {
 
 #[test]
 fn every_variant_compiles_and_draws() {
-    let mut app = clouds_app();
+    let mut app = new_clouds_app();
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let cases = spawn_cases(&mut app);
     app.insert_resource(CloudQuality::default());

@@ -16,13 +16,15 @@ use bevy::{
         renderer::{RenderDevice, RenderQueue},
         texture::GpuImage,
     },
-    time::TimeUpdateStrategy,
 };
 use bevy_cumulus::prelude::*;
 
-use crate::support::gpu::{
-    app_of, app_with, assert_shaders_compile, headless_plugins, pipelines_are_there, read_mapped, run_until,
-    run_updates, webgpu_limits,
+use super::{
+    gpu::{
+        app_of, app_with, assert_shaders_compile, headless_plugins, pipelines_are_there, read_mapped, run_until,
+        run_updates, webgpu_limits,
+    },
+    shared::{SharedApp, small_settings},
 };
 
 /// What is behind the clouds.
@@ -45,20 +47,26 @@ pub struct View {
     pub size: UVec2,
 }
 
-/// A running app with clouds whose textures are as small as they may be, and whose clock stands still.
+/// An app with clouds whose textures are as small as they may be, and whose clock stands still; nothing is in its world.
+/// Tests share it, one after another.
 ///
 /// # Panics
 /// As [`app_with`], and where clouds cannot be drawn on this device.
-pub fn clouds_app() -> App {
-    clouds_app_with(CloudsPlugin)
+pub fn clouds_app() -> SharedApp {
+    SharedApp::of_kind("clouds", new_clouds_app)
 }
 
-/// [`clouds_app`] with these plugins, of which [`CloudsPlugin`] must be one.
-pub fn clouds_app_with<M>(plugins: impl Plugins<M>) -> App {
+/// [`clouds_app`], started now and for this test alone.
+pub fn new_clouds_app() -> App {
+    new_clouds_app_with(CloudsPlugin)
+}
+
+/// [`new_clouds_app`] with these plugins, of which [`CloudsPlugin`] must be one.
+pub fn new_clouds_app_with<M>(plugins: impl Plugins<M>) -> App {
     small_clouds(app_with(plugins))
 }
 
-/// [`clouds_app`] with this folder for its assets.
+/// [`new_clouds_app`] with this folder for its assets.
 pub fn clouds_app_in(folder: &std::path::Path) -> App {
     let assets = AssetPlugin { file_path: folder.to_string_lossy().into_owned(), ..default() };
     small_clouds(app_of(headless_plugins().set(assets), CloudsPlugin))
@@ -67,9 +75,7 @@ pub fn clouds_app_in(folder: &std::path::Path) -> App {
 fn small_clouds(mut app: App) -> App {
     let unsupported = app.world().resource::<CloudStatus>().unsupported().map(str::to_owned);
     assert_eq!(unsupported, None, "clouds cannot be drawn on this device");
-    app.insert_resource(CloudTextures { volume_size: 32, map_size: 64, ..default() })
-        .insert_resource(CloudClock { seconds: 0.0, speed: 0.0 })
-        .insert_resource(TimeUpdateStrategy::ManualDuration(std::time::Duration::from_millis(16)));
+    small_settings(&mut app);
     app
 }
 
@@ -114,6 +120,8 @@ pub fn spawn_view(app: &mut App, size: UVec2, transform: Transform, sky: Sky) ->
 /// Runs frames until clouds are drawn, and all else that the camera sees; fails if that takes too long, or if a shader
 /// does not compile.
 pub fn until_drawn(app: &mut App) {
+    // Of what there is now.
+    run_updates(app, 1);
     run_until(app, "clouds are drawn", 600, |app| {
         assert_shaders_compile(app);
         app.world().resource::<CloudStatus>().is_ready() && pipelines_are_there(app)

@@ -9,6 +9,7 @@ use super::{
     app::clouds_app,
     evaluate::on_gpu_with,
     gpu::{run_until, run_updates},
+    shared::SharedApp,
 };
 
 /// One question: p and lod for the bound, q and its lod for the medium.
@@ -30,15 +31,20 @@ pub const ASK: &str = "
     results[o + 4u] = extinction_bound(p, values[i + 3u]);";
 
 /// An app whose textures are baked. No camera: the model does without.
-pub fn model_app() -> App {
+pub fn model_app() -> SharedApp {
     let mut app = clouds_app();
-    run_until(&mut app, "the textures are baked", 600, |app| {
+    until_baked(&mut app);
+    app
+}
+
+/// Runs frames until the textures are baked.
+pub fn until_baked(app: &mut App) {
+    run_until(app, "the textures are baked", 600, |app| {
         !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
     });
     // So that the baking that the small sizes ask for has begun, and ended.
-    run_updates(&mut app, 3);
-    run_until(&mut app, "the textures are baked", 600, |app| !app.world().resource::<CloudTextureStatus>().baking);
-    app
+    run_updates(app, 3);
+    run_until(app, "the textures are baked", 600, |app| !app.world().resource::<CloudTextureStatus>().baking);
 }
 
 pub fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer> {

@@ -10,5 +10,7 @@ pub mod half;
 pub mod path_trace;
 pub mod program;
 pub mod scene;
+pub mod shared;
 pub mod slab;
 pub mod temporal_modes;
+pub mod uniform_slab;

@@ -1,11 +1,13 @@
 //! Uniform slabs before the path tracer: one direction, lit by the sun or by the sky alone.
 
 use bevy::{light::light_consts::lux, math::DVec3, prelude::*};
-use bevy_cumulus::{CloudsPlugin, ModelShader, prelude::*, reference::planet::PLANET_RADIUS};
+use bevy_cumulus::prelude::*;
 
 use super::{
-    app::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, spawn_view, until_drawn},
+    app::{Sky, View, cloud_pixels, new_clouds_app, spawn_view, until_drawn},
     gpu::run_updates,
+    shared::SharedApp,
+    uniform_slab::UniformSlab,
 };
 
 pub const BOTTOM: f64 = 1000.0;
@@ -15,35 +17,27 @@ pub const THICKNESS: f64 = 1000.0;
 pub const SKY: f64 = 1000.0;
 
 /// A uniform slab of this vertical optical depth; one albedo a colour channel.
-pub fn slab(depth: f64, albedo: [f64; 3]) -> ModelShader {
+pub fn slab(depth: f64, albedo: [f64; 3]) -> UniformSlab {
     mixed_slab(depth, albedo, [1.0, 0.0, 0.0, 0.0])
 }
 
 /// The same, with these shares of the phase functions.
-pub fn mixed_slab(depth: f64, [r, g, b]: [f64; 3], [p, q, s, t]: [f64; 4]) -> ModelShader {
-    let (top, extinction) = (BOTTOM + THICKNESS, depth / THICKNESS);
-    ModelShader(format!(
-        "import package::model::{{medium::{{Medium, empty_medium}}, planet::altitude}};
-        fn model_bounds() -> vec2<f32> {{ return vec2({BOTTOM:?}, {top:?}); }}
-        fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{ return 1.0; }}
-        // Twice what is needed, so that null collisions happen.
-        fn extinction_bound(p: vec3<f32>, lod: f32) -> f32 {{ return 2.0 * {extinction:?}; }}
-        fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
-            let h = altitude(p, {PLANET_RADIUS:?});
-            if h < {BOTTOM:?} || h > {top:?} {{ return empty_medium(); }}
-            return Medium(1.0, {extinction:?}, vec3({r:?}, {g:?}, {b:?}), 1.0, vec2(h - {BOTTOM:?}, {top:?} - h),
-                vec4({p:?}, {q:?}, {s:?}, {t:?}));
-        }}"
-    ))
+pub fn mixed_slab(depth: f64, albedo: [f64; 3], phase: [f64; 4]) -> UniformSlab {
+    UniformSlab {
+        bottom: BOTTOM as f32,
+        top: (BOTTOM + THICKNESS) as f32,
+        extinction: (depth / THICKNESS) as f32,
+        albedo: DVec3::from_array(albedo).as_vec3(),
+        phase: phase.map(|share| share as f32),
+        densities: [1.0; 2],
+    }
 }
 
 /// Paths, a sky of radiance `sky` everywhere above, no ground bounce.
-pub fn traced_app(model: Option<ModelShader>, lighting: CloudLighting) -> App {
-    let mut app = match model {
-        Some(model) => clouds_app_with(move |app: &mut App| {
-            app.insert_resource(model.clone()).add_plugins(CloudsPlugin);
-        }),
-        None => clouds_app(),
+pub fn traced_app(slab: Option<UniformSlab>, lighting: CloudLighting) -> SharedApp {
+    let mut app = match slab {
+        Some(slab) => slab.traced_app(),
+        None => SharedApp::of_kind("path-traced clouds", new_clouds_app),
     };
     app.insert_resource(CloudQuality { max_distance: 2_000_000.0, ..CloudQuality::reference() });
     app.insert_resource(CloudLighting { fade_start: 1.0, aerial_perspective: 0.0, ..lighting });

@@ -9,41 +9,22 @@ use bevy::{
         sync_world::RenderEntity,
     },
 };
-use bevy_cumulus::{ModelShader, prelude::*};
+use bevy_cumulus::prelude::*;
 
-use crate::support::{
-    app::{Sky, View, clouds_app_with, read_image, spawn_sun, spawn_view, until_drawn},
+use super::{
+    app::{Sky, View, read_image, spawn_sun, spawn_view, until_drawn},
     gpu::{pipelines_are_there, run_until, run_updates},
+    shared::SharedApp,
+    uniform_slab::UniformSlab,
 };
 
 /// What the cameras of this module see where nothing is.
 pub const CLEAR: Vec3 = Vec3::new(0.1, 0.2, 0.3);
 
-/// The model's shader: extinction `extinction` (1/m) everywhere between two altitudes (m).
-pub fn slab(bottom: f32, top: f32, extinction: f32) -> ModelShader {
-    ModelShader(format!(
-        "import package::model::{{medium::{{Medium, empty_medium}}, planet::altitude}};
-        fn model_bounds() -> vec2<f32> {{ return vec2({bottom:?}, {top:?}); }}
-        fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{ return 1.0; }}
-        fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
-            let height = (altitude(p, 6360000.0) - {bottom:?}) / {:?};
-            if height < 0.0 || height > 1.0 {{ return empty_medium(); }}
-            return Medium(1.0, {extinction:?}, vec3(0.99), 0.5, vec2(height, 1.0 - height) * {:?},
-                vec4(1.0, 0.0, 0.0, 0.0));
-        }}",
-        top - bottom,
-        top - bottom
-    ))
-}
-
-/// An app whose only cloud is a [`slab`], with a sun that is not overhead. Frames stand alone, without offsets.
-pub fn slab_app(bottom: f32, top: f32, extinction: f32) -> App {
-    let shader = slab(bottom, top, extinction);
-    // In place before the built-in model is registered.
-    let insert = move |app: &mut App| {
-        app.insert_resource(shader.clone());
-    };
-    let mut app = clouds_app_with((insert, CloudsPlugin));
+/// An app whose only cloud is a uniform slab between two altitudes (m), with this extinction (1/m), and a sun that is not
+/// overhead. Frames stand alone, without offsets.
+pub fn slab_app(bottom: f32, top: f32, extinction: f32) -> SharedApp {
+    let mut app = UniformSlab::new(bottom, top, extinction).app();
     app.insert_resource(exact(MarchResolution::Full));
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     app

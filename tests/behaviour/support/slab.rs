@@ -11,14 +11,15 @@ use bevy::{
     prelude::*,
 };
 use bevy_cumulus::{
-    CloudsPlugin, ModelShader,
     prelude::*,
     reference::planet::{PLANET_RADIUS, altitude, shell_intervals},
 };
 
 use super::{
-    app::{Sky, View, cloud_pixels, clouds_app_with, spawn_sun, spawn_view},
+    app::{Sky, View, cloud_pixels, spawn_sun, spawn_view},
     gpu::run_updates,
+    shared::SharedApp,
+    uniform_slab::UniformSlab,
 };
 
 pub const BOTTOM: f64 = 1500.0;
@@ -30,33 +31,12 @@ pub const STORED: f64 = 1.05e-3;
 pub const LEAST: f64 = 6e-8;
 pub const SIZE: UVec2 = UVec2::new(9, 7);
 
-/// Constant extinction (1/m) between two altitudes. The bound is exact.
-pub fn slab(extinction: f64) -> String {
-    format!(
-        "import bevy_cumulus::model::medium::{{Medium, empty_medium}};
-import bevy_cumulus::model::planet::altitude;
-
-fn model_bounds() -> vec2<f32> {{
-    return vec2<f32>({BOTTOM:?}, {TOP:?});
-}}
-
-fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{
-    let h = altitude(p, {PLANET_RADIUS:?});
-    let reach = exp2(lod);
-    return select(0.0, 1.0, h + reach >= {BOTTOM:?} && h - reach <= {TOP:?});
-}}
-
-fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
-    let h = altitude(p, {PLANET_RADIUS:?});
-    if h < {BOTTOM:?} || h > {TOP:?} {{
-        return empty_medium();
-    }}
-    return Medium(1.0, {extinction:?}, vec3<f32>({:?}, {:?}, {:?}), 1.0, vec2(h - {BOTTOM:?}, {TOP:?} - h),
-        vec4<f32>(1.0, 0.0, 0.0, 0.0));
-}}
-",
-        ALBEDO[0], ALBEDO[1], ALBEDO[2]
-    )
+/// Constant extinction (1/m) between two altitudes.
+pub fn slab(extinction: f64) -> UniformSlab {
+    UniformSlab {
+        albedo: DVec3::from_array(ALBEDO).as_vec3(),
+        ..UniformSlab::new(BOTTOM as f32, TOP as f32, extinction as f32)
+    }
 }
 
 /// Single scattering by an isotropic medium, and nothing else.
@@ -91,16 +71,13 @@ pub fn exact_march(step: f32) -> CloudQuality {
     }
 }
 
-pub fn slab_app(extinction: f64, sun: Vec3) -> (App, View) {
-    view_of(slab(extinction), sun)
+pub fn slab_app(extinction: f64, sun: Vec3) -> (SharedApp, View) {
+    view_of(&slab(extinction), sun)
 }
 
-/// A view of this model.
-pub fn view_of(model: String, sun: Vec3) -> (App, View) {
-    let model = ModelShader(model);
-    let mut app = clouds_app_with(move |app: &mut App| {
-        app.insert_resource(model.clone()).add_plugins(CloudsPlugin);
-    });
+/// A view of this slab.
+pub fn view_of(slab: &UniformSlab, sun: Vec3) -> (SharedApp, View) {
+    let mut app = slab.app();
     app.insert_resource(plain_light());
     spawn_sun(&mut app, -sun);
     let view = spawn_view(&mut app, SIZE, Transform::default(), Sky::Black);

@@ -11,6 +11,7 @@ use bevy_cumulus::prelude::*;
 use crate::support::{
     app::{Sky, View, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
     gpu::run_updates,
+    shared::SharedApp,
     temporal_modes::{HELD, Mode, all, in_mode},
 };
 
@@ -57,7 +58,7 @@ fn truth(app: &mut App, view: &View, resolution: MarchResolution) -> Picture {
     picture(app, view)
 }
 
-fn sky() -> (App, View, Entity) {
+fn sky() -> (SharedApp, View, Entity) {
     let mut app = clouds_app();
     app.insert_resource(quality(WINDOW));
     app.insert_resource(CloudModel { wind: Vec3::new(20.0, 0.0, 0.0), ..default() });

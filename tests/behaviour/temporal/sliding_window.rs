@@ -19,6 +19,7 @@ use crate::support::{
     app::{Sky, View, cloud_pixels, clouds_app, read_image, spawn_sun, spawn_view, until_drawn},
     gpu::run_updates,
     half::{from_half, worst_relative},
+    shared::SharedApp,
     slab::{directions_through, exact_march, full_radiance, length_in_slab, looking, slab_app},
     temporal_modes::{HELD, Mode, in_mode},
 };
@@ -39,7 +40,7 @@ fn quality(window: u32) -> CloudQuality {
     CloudQuality { resolution: MarchResolution::Full, step: 160.0, light_steps: 2, window, ..default() }
 }
 
-fn watched_app() -> (App, Watched) {
+fn watched_app() -> (SharedApp, Watched) {
     let mut app = clouds_app();
     app.insert_resource(quality(4));
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));

@@ -16,6 +16,7 @@ use crate::support::{
         CLEAR, enable, exact, greatest_difference, linear_pixels, render_components, settle, slab_app, spawn_linear,
         without_clouds,
     },
+    shared::SharedApp,
 };
 
 const SIZE: UVec2 = UVec2::new(32, 24);
@@ -27,7 +28,7 @@ fn looking(yaw: f32) -> Transform {
 }
 
 /// A slab above one camera, with the sun that [`slab_app`] brings.
-fn above_one_camera() -> (App, View) {
+fn above_one_camera() -> (SharedApp, View) {
     let mut app = slab_app(1500.0, 2500.0, 0.0006);
     let view = spawn_linear(&mut app, SIZE, looking(0.0));
     until_drawn(&mut app);

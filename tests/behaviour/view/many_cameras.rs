@@ -7,12 +7,13 @@ use bevy::{
 use bevy_cumulus::{CloudsPlugin, ModelShader, prelude::*};
 
 use crate::support::{
-    app::{Sky, View, cloud_pixels, clouds_app, clouds_app_with, shown_pixels, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, View, cloud_pixels, clouds_app, new_clouds_app_with, shown_pixels, spawn_sun, spawn_view, until_drawn},
     gpu::run_updates,
     scene::{
         CLEAR, exact, greatest_difference, linear_pixels, noisy, render_components, settle, slab_app, spawn_box,
         spawn_linear,
     },
+    shared::SharedApp,
 };
 
 const SIZE: UVec2 = UVec2::new(32, 24);
@@ -23,7 +24,7 @@ fn looking(yaw: f32) -> Transform {
 }
 
 /// The built-in clouds, in frames that are noisy alone and held for eight.
-fn noisy_app() -> App {
+fn noisy_app() -> SharedApp {
     let mut app = clouds_app();
     app.insert_resource(CloudModel { wind: Vec3::new(20.0, 0.0, 0.0), coverage: 0.3, ..default() });
     app.insert_resource(noisy());
@@ -108,7 +109,7 @@ fn a_view_that_cannot_be_drawn_costs_the_others_no_history() {
         }"
         .to_owned(),
     );
-    let mut app = clouds_app_with((move |app: &mut App| _ = app.insert_resource(lumps.clone()), CloudsPlugin));
+    let mut app = new_clouds_app_with((move |app: &mut App| _ = app.insert_resource(lumps.clone()), CloudsPlugin));
     let quality = CloudQuality { light_steps: 2, ..noisy() };
     app.insert_resource(quality.clone());
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));

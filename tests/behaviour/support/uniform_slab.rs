@@ -1,0 +1,114 @@
+//! A model of one uniform slab between two altitudes. All that tells one slab from another comes from [`CloudModel`], so
+//! that all of them share one shader, and with it every pipeline.
+
+use bevy::prelude::*;
+use bevy_cumulus::{CloudsPlugin, ModelShader, prelude::*};
+
+use super::{app::new_clouds_app_with, shared::SharedApp};
+
+const SHADER: &str = "
+import package::model::{data::model, medium::{Medium, empty_medium}, planet::altitude};
+
+fn model_bounds() -> vec2<f32> {
+    return vec2(model.bottom, model.top);
+}
+
+fn density_bound(p: vec3<f32>, lod: f32) -> f32 {
+    let h = altitude(p, model.radius);
+    let reach = exp2(lod);
+    return select(0.0, 1.0, h + reach >= model.bottom && h - reach <= model.top);
+}
+
+// Twice what is needed, so that null collisions happen.
+fn extinction_bound(p: vec3<f32>, lod: f32) -> f32 {
+    return 2.0 * model.extinction;
+}
+
+fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {
+    let h = altitude(p, model.radius);
+    if h < model.bottom || h > model.top {
+        return empty_medium();
+    }
+    let density = select(model.wisp_height, model.detail_strength, h < 0.5 * (model.bottom + model.top));
+    return Medium(density, model.extinction, model.albedo.rgb, 1.0, vec2(h - model.bottom, model.top - h),
+        vec4(model.cloud_type, model.type_variation, model.map_variation, model.noise_strength));
+}
+";
+
+/// One slab.
+#[derive(Clone, Copy)]
+pub struct UniformSlab {
+    pub bottom: f32,
+    pub top: f32,
+    /// 1/m.
+    pub extinction: f32,
+    pub albedo: Vec3,
+    /// Shares of the four phase functions.
+    pub phase: [f32; 4],
+    /// Densities of the lower and of the upper half. The extinction does not follow them.
+    pub densities: [f32; 2],
+}
+
+impl UniformSlab {
+    /// White droplets of the first phase function.
+    pub fn new(bottom: f32, top: f32, extinction: f32) -> Self {
+        Self { bottom, top, extinction, albedo: Vec3::splat(0.99), phase: [1.0, 0.0, 0.0, 0.0], densities: [1.0; 2] }
+    }
+
+    /// The settings that its shader reads.
+    pub fn settings(&self) -> CloudModel {
+        let [cloud_type, type_variation, map_variation, noise_strength] = self.phase;
+        let [detail_strength, wisp_height] = self.densities;
+        let Self { bottom, top, extinction, albedo, .. } = *self;
+        CloudModel {
+            bottom,
+            top,
+            extinction,
+            albedo,
+            cloud_type,
+            type_variation,
+            map_variation,
+            noise_strength,
+            detail_strength,
+            wisp_height,
+            ..default()
+        }
+    }
+
+    /// An app whose only cloud is this slab.
+    pub fn app(&self) -> SharedApp {
+        self.app_of_kind("slab")
+    }
+
+    /// The same, of those that have compiled the path tracer, which takes a software driver a minute.
+    pub fn traced_app(&self) -> SharedApp {
+        self.app_of_kind("path-traced slab")
+    }
+
+    fn app_of_kind(&self, kind: &'static str) -> SharedApp {
+        // In place before the built-in model is registered.
+        let insert = |app: &mut App| {
+            app.insert_resource(ModelShader(SHADER.to_owned()));
+        };
+        let mut app = SharedApp::of_kind(kind, || new_clouds_app_with((insert, CloudsPlugin)));
+        app.insert_resource(self.settings());
+        app
+    }
+}
+
+/// The text of a model such as a user may write: extinction `extinction` (1/m) everywhere between two altitudes (m).
+pub fn slab_text(bottom: f32, top: f32, extinction: f32) -> ModelShader {
+    ModelShader(format!(
+        "import package::model::{{medium::{{Medium, empty_medium}}, planet::altitude}};
+        fn model_bounds() -> vec2<f32> {{ return vec2({bottom:?}, {top:?}); }}
+        fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{ return 1.0; }}
+        fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
+            let height = (altitude(p, 6360000.0) - {bottom:?}) / {:?};
+            if height < 0.0 || height > 1.0 {{ return empty_medium(); }}
+            return Medium(1.0, {extinction:?}, vec3(0.99), 0.5, vec2(height, 1.0 - height) * {:?},
+                vec4(1.0, 0.0, 0.0, 0.0));
+        }}",
+        top - bottom,
+        top - bottom
+    ))
+}
