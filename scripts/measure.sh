@@ -16,14 +16,6 @@ measure_options="  --no-install     install nothing; where something is missing,
   --truth-quality NAME  a quality preset in the path tracer's stead, to work on this script; the report goes to the
                    output folder"
 
-ensure_cxx() { # FLIP is C++
-    has c++ && return
-    case "$(uname -s)" in
-        Darwin | MINGW* | MSYS*) missing+=("a C++ compiler") && return ;;
-    esac
-    install_for "FLIP, a measure of visible difference" g++
-}
-
 # measure WHAT ARGS...: builds the renderer and the tool, then runs it.
 measure() {
     local arg args=() what=$1

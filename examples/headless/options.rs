@@ -26,7 +26,7 @@ pub struct Options {
     #[arg(long)]
     pub effective: bool,
     /// Make many pictures in one go: each line of the file holds the options of one, added to those given here. They
-    /// share scene, size and textures; nothing is quoted, `#` begins a comment
+    /// share size, textures, sky and what stands on the ground; nothing is quoted, `#` begins a comment
     #[arg(long, value_name = "FILE", conflicts_with_all = ["list", "effective"])]
     pub batch: Option<PathBuf>,
     #[command(flatten)]
@@ -219,7 +219,8 @@ impl Plan {
     /// What differs from a plan whose engine is to render this one too, if anything does.
     pub fn differs_in_setup(&self, other: &Self) -> Option<&'static str> {
         let same = [
-            ("--scene", self.scene.name == other.scene.name),
+            ("a scene's hills", self.scene.hills == other.scene.hills),
+            ("a scene's second camera", self.scene.split == other.scene.split),
             ("--size", self.size == other.size),
             ("--no-sky", self.sky == other.sky),
             ("--msaa", self.msaa == other.msaa),

@@ -68,7 +68,7 @@ pub fn shoot(plan: &Plan) -> Result<Shot> {
     if plan.strip.is_empty() { studio.picture(plan) } else { studio.strip(plan) }
 }
 
-/// Renders plans that share scene, size and textures, one after another, and hands each picture on.
+/// Renders plans that share a set-up, one after another, and hands each picture on.
 pub fn shoot_many(plans: &[Plan], mut done: impl FnMut(&Plan, &Shot) -> Result<()>) -> Result<()> {
     let Some(first) = plans.first() else { return Ok(()) };
     let mut studio = Studio::build(plans)?;

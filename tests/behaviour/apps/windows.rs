@@ -14,7 +14,7 @@ use std::{
 
 use bevy_cumulus::settings::CloudPreset;
 
-use crate::support::{gpu::webgpu_limits, program::Folder};
+use crate::support::{gpu::needs_atmosphere, program::Folder};
 use screen::{PATIENCE, Part, Picture, SCREEN, Screen, binary, wait};
 
 // Where things are in a window of 640 by 270, or twice as high.
@@ -55,17 +55,9 @@ fn fly_at(size: &str, more: &[&str]) -> (Screen, Picture) {
     (screen, clouds)
 }
 
-/// Under WebGPU's limits Bevy's `Atmosphere`, which both examples have, fails validation; nothing here differs between
-/// the two runs of scripts/test, so the ordinary one does for both.
-fn in_the_other_run() -> bool {
-    webgpu_limits()
-}
-
 #[test]
 fn keys_change_the_sky() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     let (mut screen, day) = fly(&["--sun", "15,90", "--set", "model.coverage=-0.1"]);
     let clouds = day.grey(SKY);
     screen.hold_until(&["c"], "C to bring cloud", |now| now.grey(SKY) > clouds + 0.15);
@@ -90,9 +82,7 @@ fn keys_change_the_sky() {
 
 #[test]
 fn p_goes_on_through_skies_that_differ_in_layers_alone() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     let (mut screen, _) = fly(&["--preset", "Cumulus", "--set", "clock.speed=0"]);
     for _ in 0..2 {
         let before = screen.picture();
@@ -138,9 +128,7 @@ fn fold(screen: &mut Screen, title: [usize; 2], folded: bool) {
 
 #[test]
 fn keys_change_quality_and_clock_as_the_panel_shows() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     let (mut screen, _) = fly(&[]);
     screen.act(&["key", "i"]);
     screen.wait_for("I to open the panel", |now| now.brightness(PANEL) < 60.0);
@@ -195,9 +183,7 @@ fn save(screen: &mut Screen, name: &str) -> CloudPreset {
 
 #[test]
 fn a_dragged_slider_changes_the_clouds_and_a_saved_preset_loads_back() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     // Few, so that there is room for more: their shade counts as grey too.
     let (mut screen, _) = fly_at("640x540", &["--set", "model.coverage=-0.2"]);
     screen.act(&["key", "i"]);
@@ -224,9 +210,7 @@ fn a_dragged_slider_changes_the_clouds_and_a_saved_preset_loads_back() {
 
 #[test]
 fn a_preset_file_is_read_again_when_it_is_saved() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     let folder = Folder::new();
     let file = folder.join("sky.ron");
     let write = |coverage: &str| {
@@ -251,9 +235,7 @@ fn a_preset_file_is_read_again_when_it_is_saved() {
 
 #[test]
 fn a_window_may_be_small_large_hidden_and_shown() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     let (mut screen, _) = fly(&[]);
     let window = screen.window.clone();
     for [width, height] in [[64, 40], [1, 1], [7, 300], [900, 90], [640, 270]] {
@@ -273,9 +255,7 @@ fn a_window_may_be_small_large_hidden_and_shown() {
 
 #[test]
 fn minimal_shows_a_sky() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     let mut screen = Screen::show("minimal", ".", &[]);
     let above = [0, 0, SCREEN[0], 200];
     screen.wait_for("a sky with clouds", |now| now.brightness(above) > 20.0 && (0.02..0.95).contains(&now.grey(above)));
@@ -283,9 +263,7 @@ fn minimal_shows_a_sky() {
 
 #[test]
 fn a_window_manager_enlarges_hides_and_closes_it() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     let mut screen = Screen::show_managed("fly_camera", "bevy_cumulus", &[&QUICK[..], &["--size", "640x270"]].concat());
     screen.wait_for("clouds", |now| (0.05..0.9).contains(&now.grey(SKY)));
     // The desktop is all grey; a window that reaches here shows blue sky.
@@ -322,9 +300,7 @@ fn without_a_display_it_says_so() {
 
 #[test]
 fn the_settings_show_in_another_inspector() {
-    if in_the_other_run() {
-        return;
-    }
+    needs_atmosphere();
     let mut screen = Screen::show("resource_inspector", "bevy_cumulus", &[]);
     // Its first window, with the model, is as dark as the sky is bright. Its fourth row is the coverage.
     let (window, sky, coverage) = ([20, 50, 280, 290], [320, 10, 900, 200], [132, 121]);

@@ -8,7 +8,6 @@ use std::{
     fmt::Write as _,
     fs,
     path::{Path, PathBuf},
-    process::Command,
 };
 
 use bevy_cumulus::{prelude::*, settings::snake_case};
@@ -16,8 +15,8 @@ use image::Rgba32FImage;
 
 use crate::support::{
     golden::{compare_with_golden, failures, folder, read},
-    gpu::webgpu_limits,
-    program::{binary, read_cloud},
+    gpu::needs_atmosphere,
+    program::{command, read_cloud},
 };
 
 /// The mean transmittance, least and most, of each preset's clouds as seen from the ground: wide enough for a preset to be
@@ -102,12 +101,9 @@ fn render(shots: &[Shot]) -> PathBuf {
     fs::create_dir_all(&made).unwrap_or_else(|error| panic!("{}: {error}", made.display()));
     let lines: Vec<String> = shots.iter().map(line).collect();
     fs::write(made.join("batch"), lines.join("\n")).unwrap_or_else(|error| panic!("{}: {error}", made.display()));
-    let mut command = Command::new(binary());
-    command.args(["--batch", "batch"]).args(SMALL).current_dir(&made);
-    if webgpu_limits() {
-        command.arg("--no-sky");
-    }
-    let output = command.output().expect("the example starts");
+    let mut command = command();
+    let output =
+        command.args(["--batch", "batch"]).args(SMALL).current_dir(&made).output().expect("the example starts");
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "it failed with {:?}: {said}", output.status.code());
     made
@@ -131,16 +127,13 @@ fn check(shot: &Shot, made: &Path) -> Result<(), String> {
     if let Some(fault) = fault(&read_cloud(&made.join(&shot.name).with_extension("exr")), shot.transmittance) {
         return Err(named(fault));
     }
-    // Bevy's environment light is missing there, and the ground is dark.
-    if webgpu_limits() {
-        return Ok(());
-    }
     let path = made.join(&shot.name).with_extension("png");
     compare_with_golden(&format!("presets/{}", shot.name), &read(&path).map_err(named)?, &path)
 }
 
 #[test]
 fn presets_look_as_they_did() {
+    needs_atmosphere();
     let shots = shots();
     let made = render(&shots);
     let wrong: Vec<String> = shots.iter().filter_map(|shot| check(shot, &made).err()).collect();

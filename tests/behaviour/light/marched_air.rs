@@ -8,7 +8,7 @@ use bevy_cumulus::prelude::*;
 
 use crate::support::{
     app::{Sky, View, cloud_pixels, spawn_sun, spawn_view, until_drawn},
-    gpu::webgpu_limits,
+    gpu::needs_atmosphere,
     scene::{exact, settle},
     shared::SharedApp,
     uniform_slab::UniformSlab,
@@ -40,10 +40,7 @@ fn seen_from(app: &mut App, view: &View, altitude: f32, pitch: f32) -> Vec3 {
 
 #[test]
 fn marched_air_is_what_bevys_table_holds() {
-    // Under WebGPU's limits there is no atmosphere.
-    if webgpu_limits() {
-        return;
-    }
+    needs_atmosphere();
     // A deck that sends no light of its own, within the table's 32 km.
     let (mut app, view) = deck(0.0, CloudLighting::default());
     for (altitude, pitch) in [(4000.0, 50.0), (8000.0, 60.0)] {
@@ -63,9 +60,7 @@ fn marched_air_is_what_bevys_table_holds() {
 
 #[test]
 fn from_space_there_is_blue_air_before_the_clouds() {
-    if webgpu_limits() {
-        return;
-    }
+    needs_atmosphere();
     let (mut app, view) = deck(0.0, CloudLighting::default());
     let light = seen_from(&mut app, &view, 400_000.0, 50.0);
     println!("{light}");
@@ -75,9 +70,7 @@ fn from_space_there_is_blue_air_before_the_clouds() {
 
 #[test]
 fn from_space_clouds_are_lit_by_the_sky_that_is_over_them() {
-    if webgpu_limits() {
-        return;
-    }
+    needs_atmosphere();
     // By sky and ground alone, through no air.
     let lighting = CloudLighting { octaves: 0, diffusion: 0.0, aerial_perspective: 0.0, ..default() };
     let (mut app, view) = deck(0.999, lighting);

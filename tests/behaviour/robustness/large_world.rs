@@ -5,7 +5,7 @@ use bevy_cumulus::{prelude::*, reference::planet::PLANET_RADIUS};
 
 use crate::support::{
     app::{Sky, View, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
-    gpu::{run_updates, webgpu_limits},
+    gpu::{needs_atmosphere, run_updates},
     shared::SharedApp,
 };
 
@@ -141,9 +141,7 @@ fn an_origin_that_shifts_far_away_leaves_no_smear() {
 
 #[test]
 fn the_planet_of_an_atmosphere_shifts_with_the_origin() {
-    if webgpu_limits() {
-        return;
-    }
+    needs_atmosphere();
     // Near enough that the planet's transform, in steps of half a metre, is as right before as after.
     const FAR: f64 = 1e5;
     let mut world = world_under(TemporalMode::SlidingWindow, Sky::Atmosphere);

@@ -45,6 +45,14 @@ pub fn webgpu_limits() -> bool {
     std::env::var("WGPU_SETTINGS_PRIO").is_ok_and(|priority| priority.eq_ignore_ascii_case("webgpu"))
 }
 
+/// For tests that need Bevy's `Atmosphere`: they are not among those that run under WebGPU's limits (`webgpu.txt`).
+///
+/// # Panics
+/// Under those limits.
+pub fn needs_atmosphere() {
+    assert!(!webgpu_limits(), "this test needs Bevy's Atmosphere, which fails validation under WebGPU's limits");
+}
+
 /// Bevy's plugins without a window, in lock step: one update is one whole frame.
 pub fn headless_plugins() -> PluginGroupBuilder {
     let plugins = DefaultPlugins

@@ -30,7 +30,7 @@ fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {
         return empty_medium();
     }
     let density = select(model.wisp_height, model.detail_strength, h < 0.5 * (model.bottom + model.top));
-    return Medium(density, model.extinction, model.albedo.rgb, 1.0, vec2(h - model.bottom, model.top - h),
+    return Medium(density, model.extinction, model.albedo.rgb, 0.5, vec2(h - model.bottom, model.top - h),
         vec4(model.cloud_type, model.type_variation, model.map_variation, model.noise_strength));
 }
 ";
@@ -85,7 +85,8 @@ impl UniformSlab {
         self.app_of_kind("path-traced slab")
     }
 
-    fn app_of_kind(&self, kind: &'static str) -> SharedApp {
+    /// The same, of those that only tests that name this kind get.
+    pub fn app_of_kind(&self, kind: &'static str) -> SharedApp {
         // In place before the built-in model is registered.
         let insert = |app: &mut App| {
             app.insert_resource(ModelShader(SHADER.to_owned()));
