@@ -149,7 +149,7 @@ fn a_change_of_the_view_drops_the_history() {
 fn a_users_model_without_maps_keeps_its_clouds() {
     let slab = UniformSlab::new(1000.0, 3000.0, 0.002);
     // One of its shaders fails, which must not be found in others' apps.
-    let mut app = slab.app_of_kind("slab without maps");
+    let mut app = slab.alone();
     app.insert_resource(exact(MarchResolution::Full));
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let up = Transform::from_xyz(0.0, 0.0, 0.0).looking_to(Vec3::Y, Vec3::Z);

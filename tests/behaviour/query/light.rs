@@ -110,7 +110,7 @@ fn transmittance_through_layers_is_that_of_a_fine_march_on_the_gpu() {
         CloudLayer { coverage: -0.35, rain: 0.3, ..thin(layers::storm()) },
         CloudLayer { extinction: 0.002, base: 2500.0, coverage: -0.3, far_coverage: 0.0, ..layers::sheet() },
     ]));
-    app.insert_resource(CloudModel { coverage: 0.0, ..app.world().resource::<CloudModel>().clone() });
+    app.world_mut().resource_mut::<CloudModel>().coverage = 0.0;
     // One place is cleared, one is overcast.
     for (x, strength) in [(-9000.0, -1.0), (9000.0, 0.7)] {
         let zone = CloudZone { radius: 7000.0, edge: 3000.0, strength };

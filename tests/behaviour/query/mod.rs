@@ -25,12 +25,13 @@ use crate::support::{
     app::new_clouds_app_with,
     evaluate::{U, on_gpu_with},
     gpu::{run_until, run_updates},
+    shared::SharedApp,
 };
 
 /// An app without a camera whose sky the CPU has.
-pub fn field_app(textures: CloudTextures) -> App {
-    let mut app = new_clouds_app_with((CloudFieldPlugin, CloudsPlugin));
-    app.insert_resource(textures);
+pub fn field_app(textures: CloudTextures) -> SharedApp {
+    let kind = if textures == small(1) { "queries" } else { "queries of other textures" };
+    let mut app = SharedApp::with_textures(kind, textures, || new_clouds_app_with((CloudFieldPlugin, CloudsPlugin)));
     until_current(&mut app);
     app
 }

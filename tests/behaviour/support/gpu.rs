@@ -24,8 +24,9 @@ use bevy::{
         pipelined_rendering::PipelinedRenderingPlugin,
         render_resource::{
             BindGroup, BindGroupEntries, BindGroupLayoutDescriptor, BindGroupLayoutEntries, Buffer, BufferDescriptor,
-            BufferInitDescriptor, BufferUsages, CachedPipelineState, CommandEncoderDescriptor, ComputePassDescriptor,
-            ComputePipeline, ComputePipelineDescriptor, MapMode, Pipeline, PipelineCache, PollType, ShaderStages,
+            BufferInitDescriptor, BufferUsages, CachedComputePipelineId, CachedPipelineState, CommandEncoderDescriptor,
+            ComputePassDescriptor, ComputePipeline, ComputePipelineDescriptor, MapMode, Pipeline, PipelineCache,
+            PollType, ShaderStages,
             binding_types::{storage_buffer_read_only_sized, storage_buffer_sized},
         },
         renderer::{RenderDevice, RenderQueue},
@@ -247,19 +248,35 @@ pub fn run_compute_with_groups(
     result
 }
 
-fn compile(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> ComputePipeline {
+/// Pipelines of test shaders that an app has made, by text and layouts: a software driver takes seconds for each that
+/// imports the model.
+#[derive(Resource, Default)]
+struct TestPipelines(Vec<(String, Vec<BindGroupLayoutDescriptor>, CachedComputePipelineId)>);
+
+/// The pipeline of this shader; asked for only the first time.
+fn queue(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> CachedComputePipelineId {
     static NEXT: AtomicU32 = AtomicU32::new(0);
+    let made = app.world_mut().get_resource_or_init::<TestPipelines>();
+    if let Some((.., id)) = made.0.iter().find(|(text, with, _)| text == wesl && with == layouts) {
+        return *id;
+    }
     let path = format!("embedded://behaviour/compute_{}.wesl", NEXT.fetch_add(1, Ordering::Relaxed));
     let shader = Shader::from_wesl(wesl.to_owned(), path);
     let shader = app.world_mut().resource_mut::<Assets<Shader>>().add(shader);
     let descriptor = ComputePipelineDescriptor {
         label: Some("test compute".into()),
         layout: layouts.to_vec(),
-        shader: shader.clone(),
+        shader,
         entry_point: Some("main".into()),
         ..default()
     };
     let id = app.sub_app(RenderApp).world().resource::<PipelineCache>().queue_compute_pipeline(descriptor);
+    app.world_mut().resource_mut::<TestPipelines>().0.push((wesl.to_owned(), layouts.to_vec(), id));
+    id
+}
+
+fn compile(app: &mut App, wesl: &str, layouts: &[BindGroupLayoutDescriptor]) -> ComputePipeline {
+    let id = queue(app, wesl, layouts);
     let (start, mut waiting_for) = (Instant::now(), String::new());
     while start.elapsed() < COMPILE_PATIENCE {
         app.update();

@@ -37,7 +37,7 @@ pub fn mixed_slab(depth: f64, albedo: [f64; 3], phase: [f64; 4]) -> UniformSlab 
 pub fn traced_app(slab: Option<UniformSlab>, lighting: CloudLighting) -> SharedApp {
     let mut app = match slab {
         Some(slab) => slab.traced_app(),
-        None => SharedApp::of_kind("path-traced clouds", new_clouds_app),
+        None => SharedApp::only_one("path-traced clouds", new_clouds_app),
     };
     app.insert_resource(CloudQuality { max_distance: 2_000_000.0, ..CloudQuality::reference() });
     app.insert_resource(CloudLighting { fade_start: 1.0, aerial_perspective: 0.0, ..lighting });

@@ -77,23 +77,32 @@ impl UniformSlab {
 
     /// An app whose only cloud is this slab.
     pub fn app(&self) -> SharedApp {
-        self.app_of_kind("slab")
+        self.shown_in(SharedApp::of_kind("slab", Self::new_app))
     }
 
     /// The same, of those that have compiled the path tracer, which takes a software driver a minute.
     pub fn traced_app(&self) -> SharedApp {
-        self.app_of_kind("path-traced slab")
+        self.shown_in(SharedApp::only_one("path-traced slab", Self::new_app))
     }
 
-    /// The same, of those that only tests that name this kind get.
-    pub fn app_of_kind(&self, kind: &'static str) -> SharedApp {
+    /// The same, started now and for this test alone.
+    pub fn alone(&self) -> App {
+        let mut app = Self::new_app();
+        app.insert_resource(self.settings());
+        app
+    }
+
+    fn shown_in(&self, mut app: SharedApp) -> SharedApp {
+        app.insert_resource(self.settings());
+        app
+    }
+
+    fn new_app() -> App {
         // In place before the built-in model is registered.
         let insert = |app: &mut App| {
             app.insert_resource(ModelShader(SHADER.to_owned()));
         };
-        let mut app = SharedApp::of_kind(kind, || new_clouds_app_with((insert, CloudsPlugin)));
-        app.insert_resource(self.settings());
-        app
+        new_clouds_app_with((insert, CloudsPlugin))
     }
 }
 
