@@ -27,6 +27,18 @@ fn render(arguments: &[&str]) -> Folder {
     folder
 }
 
+/// The clouds of one picture a line, made in one run.
+fn render_batch<const N: usize>(shared: &[&str], lines: [&str; N]) -> [Rgba32FImage; N] {
+    let folder = Folder::new();
+    let numbered = (1..).zip(lines).map(|(n, line)| format!("{line} --cloud {n}.exr # {n}\n\n")).collect::<String>();
+    fs::write(folder.join("batch.txt"), numbered).expect("the folder can be written");
+    let output = run_in(&folder, &[shared, &SMALL, &["--batch", "batch.txt"]].concat());
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let told: String = (1..=N).map(|n| format!("[{n}/{N}] {n}.exr\n")).collect();
+    assert_eq!(String::from_utf8_lossy(&output.stdout), told);
+    std::array::from_fn(|k| read_cloud(&folder.join(format!("{}.exr", k + 1))))
+}
+
 const SHOT: &[&str] = &["--size", "64x36", "--frames", "3", "--cloud", "cloud.exr", "--set", "model.density=0.9"];
 
 /// One run that writes everything, shared by the tests that look at it.
@@ -83,7 +95,7 @@ fn a_strip_has_its_pictures_side_by_side() {
 
 #[test]
 fn a_debug_view_changes_the_picture() {
-    let alone = ["--size", "32x18", "--frames", "1", "--camera", "0,2,0,0,40", "--out", "shot.png"];
+    let alone = ["--size", "32x18", "--frames", "1", "--camera", "0,2,0,0,40", "--no-sky", "--out", "shot.png"];
     let shot = |debug| read(&render(&[&alone[..], &["--debug", debug]].concat()).join("shot.png")).to_rgb8();
     assert!(shot("none") != shot("coverage_map"));
     let grey = |p: &image::Rgb<u8>| p.0.iter().max().unwrap_or(&0) - p.0.iter().min().unwrap_or(&0) <= 6;
@@ -155,7 +167,10 @@ fn mistakes_are_named_and_nothing_is_written() {
 fn a_full_disk_is_an_error() {
     // Opens, but takes no byte: what is written last must be checked too.
     let folder = Folder::new();
-    let output = run_in(&folder, &[&["--size", "8x8", "--frames", "1", "--timings", "/dev/full"], &SMALL[..]].concat());
+    let output = run_in(
+        &folder,
+        &[&["--size", "8x8", "--frames", "1", "--no-sky", "--timings", "/dev/full"], &SMALL[..]].concat(),
+    );
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(!output.status.success() && said.contains("/dev/full") && !said.contains("panicked"), "{said}");
 }
@@ -250,23 +265,12 @@ fn the_same_command_gives_the_same_clouds_from_any_folder() {
 #[test]
 fn moves_are_made_before_every_frame_but_the_first() {
     // Nothing is carried from frame to frame, so the last one is as if it stood alone.
-    let alone = ["--size", "32x18", "--set", "quality.temporal=off", "--set", "quality.offsets=false"];
-    let alone = [&alone[..], &["--cloud", "cloud.exr", "--no-sky"]].concat();
-    let moving = render(
-        &[
-            &alone[..],
-            &["--frames", "3", "--camera", "-50,100,0,-10,20", "--move", "0,100,0,5,0"],
-            &["--sun", "40,-20", "--sun-move", "1,-2", "--time", "100", "--dt", "10"],
-        ]
-        .concat(),
-    );
-    let standing = render(
-        &[&alone[..], &["--frames", "1", "--camera", "-50,300,0,0,20", "--sun", "42,-24", "--time", "120"]].concat(),
-    );
-    let started = render(
-        &[&alone[..], &["--frames", "1", "--camera", "-50,100,0,-10,20", "--sun", "40,-20", "--time", "100"]].concat(),
-    );
-    let [moving, standing, started] = [moving, standing, started].map(|path| read_cloud(&path.join("cloud.exr")));
+    let alone = ["--size", "32x18", "--set", "quality.temporal=off", "--set", "quality.offsets=false", "--no-sky"];
+    let moving =
+        "--frames 3 --camera -50,100,0,-10,20 --move 0,100,0,5,0 --sun 40,-20 --sun-move 1,-2 --time 100 --dt 10";
+    let standing = "--frames 1 --camera -50,300,0,0,20 --sun 42,-24 --time 120";
+    let started = "--frames 1 --camera -50,100,0,-10,20 --sun 40,-20 --time 100";
+    let [moving, standing, started] = render_batch(&alone, [moving, standing, started]);
     assert!(moving == standing, "two moves from the start is where the third frame stands");
     assert!(moving != started, "moves change what is seen");
 }
@@ -282,19 +286,14 @@ fn without_sky_and_cloud_the_picture_is_black_above() {
 
 #[test]
 fn a_batch_makes_the_pictures_that_its_lines_make_alone() {
-    let still = ["--size", "32x18", "--frames", "1", "--set", "quality.temporal=off", "--set", "quality.offsets=false"];
+    let still = ["--size", "32x18", "--frames", "1", "--no-sky"];
+    let still = [&still[..], &["--set", "quality.temporal=off", "--set", "quality.offsets=false"]].concat();
     let lines = ["--set model.coverage=0.3", "--set model.coverage=-0.2 --set quality.resolution=quarter --time 50"];
-    let folder = Folder::new();
-    let numbered = (1..).zip(lines).map(|(n, line)| format!("{line} --cloud {n}.exr # {n}\n\n")).collect::<String>();
-    fs::write(folder.join("batch.txt"), numbered).expect("the folder can be written");
-    let output = run_in(&folder, &[&still[..], &SMALL, &["--batch", "batch.txt"]].concat());
-    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
-    assert_eq!(String::from_utf8_lossy(&output.stdout), "[1/2] 1.exr\n[2/2] 2.exr\n");
-    for (n, line) in (1..).zip(lines) {
+    let together = render_batch(&still, lines);
+    for (line, together) in lines.into_iter().zip(together) {
         let words: Vec<&str> = line.split_whitespace().collect();
         let alone = render(&[&still[..], &words, &["--cloud", "cloud.exr"]].concat());
-        let (one, other) = (read_cloud(&alone.join("cloud.exr")), read_cloud(&folder.join(format!("{n}.exr"))));
-        assert!(one == other, "picture {n} of the batch differs from the one made alone");
+        assert!(read_cloud(&alone.join("cloud.exr")) == together, "{line}: the batch's picture differs");
     }
 }
 
