@@ -19,6 +19,7 @@ mod hogfeldt_controls;
 mod intervals;
 mod large_world;
 mod layers;
+mod low_sun;
 mod many_cameras;
 mod map_files;
 mod march_steps;
