@@ -102,7 +102,7 @@ fn in_a_white_furnace_clouds_vanish() {
     let lighting = CloudLighting { ground_albedo: Vec3::ONE, ..sky_light(PhaseFunction::HgDraine) };
     let mut app = traced_app(None, lighting);
     app.insert_resource(CloudModel { albedo: Vec3::ONE, coverage: 0.3, ..default() });
-    spawn_sun(&mut app, Vec3::Y);
+    spawn_sun(&mut app, Vec3::NEG_Y);
     for pitch in [25.0_f32, -60.0] {
         let height = if pitch > 0.0 { 10.0 } else { 5000.0 };
         let looking = Transform::from_xyz(0.0, height, 0.0).with_rotation(Quat::from_rotation_x(pitch.to_radians()));
@@ -122,7 +122,7 @@ fn a_half_space_reflects_as_chandrasekhar_says() {
     // τ = 80 is deep enough: at albedo .99 light dies out over six mean free paths.
     for mu in [0.2, 0.6, 1.0] {
         let mut app = traced_app(Some(slab(80.0, albedo)), sky_light(PhaseFunction::Isotropic));
-        spawn_sun(&mut app, Vec3::Y);
+        spawn_sun(&mut app, Vec3::NEG_Y);
         let view = spawn_pinhole(&mut app, UVec2::new(128, 96), -mu);
         let found = mean(&mut app, &view, 24);
         for (found, albedo) in found.into_iter().zip(albedo) {
@@ -170,7 +170,7 @@ fn finite_slabs_reflect_and_transmit_as_adding_says() {
             let slabs = albedo.map(|albedo| Slab::new(depth, albedo, &moments, 24, mu));
             for up in [1.0, -1.0] {
                 let mut app = traced_app(Some(slab(depth, albedo)), sky_light(phase));
-                spawn_sun(&mut app, Vec3::Y);
+                spawn_sun(&mut app, Vec3::NEG_Y);
                 let view = spawn_pinhole(&mut app, UVec2::new(128, 96), up * mu);
                 // Little comes through the thick one at the least albedo: one path in seventy.
                 let frames = if depth > 1.0 && up > 0.0 { 192 } else { 32 };
@@ -312,7 +312,7 @@ fn random_numbers_are_uniform_and_streams_do_not_correlate() {
 #[test]
 fn samples_add_up_while_nothing_moves_and_their_noise_is_known() {
     let mut app = traced_app(Some(slab(2.0, [0.99; 3])), sky_light(PhaseFunction::Isotropic));
-    spawn_sun(&mut app, Vec3::Y);
+    spawn_sun(&mut app, Vec3::NEG_Y);
     let view = spawn_pinhole(&mut app, UVec2::new(64, 48), 0.8);
     let noise = app.world_mut().resource_mut::<Assets<Image>>().add(CloudNoise::image(64, 48));
     app.world_mut().entity_mut(view.camera).insert(CloudNoise(noise.clone()));

@@ -44,15 +44,21 @@ pub fn traced_app(slab: Option<UniformSlab>, lighting: CloudLighting) -> SharedA
     app
 }
 
-/// Light by the sky alone: the sun stands below the ground.
+/// Light by the sky alone, under a sun overhead that gives none itself: without one in the scene there is no sky.
 pub fn sky_light(phase: PhaseFunction) -> CloudLighting {
     let fallback = (SKY / f64::from(lux::RAW_SUNLIGHT)) as f32;
-    CloudLighting { phase, sky_fallback: Vec3::splat(fallback), ground_albedo: Vec3::ZERO, ..default() }
+    CloudLighting {
+        phase,
+        sky_fallback: Vec3::splat(fallback),
+        sun_strength: 0.0,
+        ground_albedo: Vec3::ZERO,
+        ..default()
+    }
 }
 
 /// Light by the sun alone.
 pub fn sun_light(phase: PhaseFunction) -> CloudLighting {
-    CloudLighting { sky_fallback: Vec3::ZERO, ..sky_light(phase) }
+    CloudLighting { sky_fallback: Vec3::ZERO, sun_strength: 1.0, ..sky_light(phase) }
 }
 
 /// A camera that sees one direction: up by `mu`, the cosine to the vertical, from just outside the slab.
