@@ -33,8 +33,7 @@ pub const SIZE: UVec2 = UVec2::new(9, 7);
 /// Constant extinction (1/m) between two altitudes. The bound is exact.
 pub fn slab(extinction: f64) -> String {
     format!(
-        "import bevy_cumulus::model::medium::{{Medium, empty_medium}};
-import bevy_cumulus::model::planet::altitude;
+        "import bevy_cumulus::{{Medium, empty_medium, altitude}};
 
 fn model_bounds() -> vec2<f32> {{
     return vec2<f32>({BOTTOM:?}, {TOP:?});
