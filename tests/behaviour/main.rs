@@ -2,6 +2,7 @@
 //! where there is none.
 
 mod apps;
+mod docs;
 mod goldens;
 mod light;
 mod march;

@@ -104,7 +104,7 @@ struct Faded {
 
 const FADED: &str = "
 import bevy_pbr::render::{forward_io::VertexOutput, mesh_view_bindings::view};
-import bevy_cumulus::render::composite::fade::cloud_fade;
+import bevy_cumulus::cloud_fade;
 
 @group(constants::MATERIAL_BIND_GROUP) @binding(0) var clouds: texture_2d<f32>;
 

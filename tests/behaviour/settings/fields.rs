@@ -354,33 +354,3 @@ fn preset_files_load_as_assets_without_a_renderer() {
     app.update();
     assert_eq!(*app.world().resource::<CloudModel>(), preset.model);
 }
-
-#[test]
-fn the_readme_names_every_field() {
-    let readme = include_str!("../../../README.md");
-    let table = readme.split("## Settings").nth(1).and_then(|rest| rest.split("\n## ").next()).expect("the section");
-    let row = |name: &str| table.lines().find(|line| line.starts_with(&format!("| `{name}`"))).expect(name);
-    let all = [
-        CloudModel::type_info(),
-        CloudLayer::type_info(),
-        WeatherRecipe::type_info(),
-        CloudLighting::type_info(),
-        CloudQuality::type_info(),
-        CloudTextures::type_info(),
-        CloudTextureSlots::type_info(),
-        CloudClock::type_info(),
-        CloudZone::type_info(),
-        CloudView::type_info(),
-    ];
-    for info in all {
-        let info = struct_info(info);
-        let row = row(info.type_path_table().ident().expect("a name"));
-        for field in info.field_names() {
-            assert!(row.contains(&format!("`{field}`")), "{field} is not in {row}");
-        }
-        // Between backticks stand the row's own name, its fields, and nothing else; but functions.
-        let known = |word: &&str| word.ends_with("()") || info.field_names().contains(word);
-        let named: Vec<_> = row.split('`').skip(3).step_by(2).filter(|word| !known(word)).collect();
-        assert!(named.is_empty(), "{named:?} are no fields of {}", info.type_path());
-    }
-}
