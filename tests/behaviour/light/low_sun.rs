@@ -10,7 +10,6 @@ use bevy::{
     prelude::*,
 };
 use bevy_cumulus::{
-    CloudsPlugin, ModelShader,
     prelude::*,
     reference::planet::{PLANET_RADIUS, altitude, visible_sun},
 };
@@ -19,11 +18,13 @@ use rand::{Rng, SeedableRng, rngs::StdRng};
 use crate::{
     query::{field_app, sky, small},
     support::{
-        app::{Sky, View, new_clouds_app_with, spawn_sun, spawn_view},
+        app::{Sky, View, spawn_sun, spawn_view},
         evaluate::{COUNT, R, on_gpu},
         gpu::{run_updates, shader_app},
         path_trace::mean,
+        shared::SharedApp,
         slab::{exact_march, plain_light},
+        uniform_slab::UniformSlab,
     },
 };
 
@@ -38,50 +39,53 @@ const DISC: f64 = SunDisk::EARTH.angular_size as f64;
 const MARCHED: f64 = 3e-3;
 const TRACED: f64 = 3e-2;
 /// Samples of the path tracer.
-const FRAMES: u32 = 40;
+const FRAMES: u32 = 100;
 
-/// Small clouds around the camera's axis and 2.3 km aside, where none of the places lies at which the ground's shade is
-/// looked for: a column from 1.5 to 2.5 km over the camera or under it, and aside one at 500 m and one at 10 km. All
-/// end where a step of 20 m does.
-fn small_clouds() -> ModelShader {
-    ModelShader(format!(
-        "import package::model::{{medium::{{Medium, empty_medium}}, planet::altitude}};
-        fn model_bounds() -> vec2<f32> {{ return vec2(440.0, 10050.0); }}
-        fn is_near_cloud(p: vec3<f32>, reach: f32) -> bool {{
-            let h = altitude(p, {R:?});
-            let column = length(p.xz) < 300.0 + reach && abs(h - 2000.0) < 500.0 + reach;
-            let aside = length(p.xz - vec2(2300.0, 0.0)) < 300.0 + reach;
-            return column || (aside && min(abs(h - 500.0), abs(h - 10000.0)) < 50.0 + reach);
-        }}
-        fn density_bound(p: vec3<f32>, lod: f32) -> f32 {{ return select(0.0, 1.0, is_near_cloud(p, exp2(lod))); }}
-        // Fifty times what is needed: most paths then find some of the thin cloud.
-        fn extinction_bound(p: vec3<f32>, lod: f32) -> f32 {{
-            return select(0.0, 50.0 * {EXTINCTION:?}, is_near_cloud(p, exp2(lod)));
-        }}
-        fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {{
-            let h = altitude(p, {R:?});
-            if !is_near_cloud(p, 0.0) {{ return empty_medium(); }}
-            return Medium(1.0, {EXTINCTION:?}, vec3({ALBEDO:?}), 1.0, vec2(h - 440.0, 10050.0 - h),
-                vec4(1.0, 0.0, 0.0, 0.0));
-        }}"
-    ))
-}
-
-/// A straight look through one of the clouds: from where, which way, and where it enters and leaves the cloud (m).
+/// A straight look through a small cloud: from where, which way, and where it enters and leaves the cloud (m). The cloud is
+/// a disc between two altitudes, this far along +x, and ends where a step of 20 m does. Those that are looked at level lie
+/// aside, where none of the places is at which the ground's shade is looked for.
 #[derive(Clone, Copy, Debug)]
 struct Look {
     name: &'static str,
     height: f64,
     direction: DVec3,
     cloud: [f64; 2],
+    altitudes: [f32; 2],
+    aside: f32,
 }
 
-const BELOW: Look = Look { name: "from below", height: 10.0, direction: DVec3::Y, cloud: [1490.0, 2490.0] };
-const ABOVE: Look = Look { name: "from above", height: 6000.0, direction: DVec3::NEG_Y, cloud: [3500.0, 4500.0] };
-const LOW: Look = Look { name: "at 500 m", height: 500.0, direction: DVec3::X, cloud: [2000.0, 2600.0] };
-const HIGH: Look = Look { name: "at 10 km", height: 10_000.0, direction: DVec3::X, cloud: [2000.0, 2600.0] };
+const BELOW: Look = Look {
+    name: "from below",
+    height: 10.0,
+    direction: DVec3::Y,
+    cloud: [1490.0, 2490.0],
+    altitudes: [1500.0, 2500.0],
+    aside: 0.0,
+};
+const ABOVE: Look =
+    Look { name: "from above", height: 6000.0, direction: DVec3::NEG_Y, cloud: [3500.0, 4500.0], ..BELOW };
+const LOW: Look = Look {
+    name: "at 500 m",
+    height: 500.0,
+    direction: DVec3::X,
+    cloud: [2000.0, 2600.0],
+    altitudes: [450.0, 550.0],
+    aside: 2300.0,
+};
+const HIGH: Look = Look { name: "at 10 km", height: 10_000.0, altitudes: [9950.0, 10_050.0], ..LOW };
 
 impl Look {
+    fn slab(&self) -> UniformSlab {
+        let [bottom, top] = self.altitudes;
+        UniformSlab {
+            albedo: Vec3::splat(ALBEDO as f32),
+            disc: Some([300.0, self.aside]),
+            // Most paths then find some of the thin cloud.
+            majorant: 50.0,
+            ..UniformSlab::new(bottom, top, EXTINCTION as f32)
+        }
+    }
+
     /// Mean over the cloud of a value at points, each weighed by how much of it is seen; times the cloud's opacity.
     fn seen(&self, value: impl Fn(DVec3) -> f64) -> f64 {
         let [start, end] = self.cloud;
@@ -117,17 +121,14 @@ fn twilight(elevation: f64) -> f64 {
 
 /// The scene of these tests: its app, camera and sun.
 struct Stage {
-    app: App,
+    app: SharedApp,
     view: View,
     sun: Entity,
 }
 
 impl Stage {
     fn new() -> Self {
-        let model = small_clouds();
-        let mut app = new_clouds_app_with(move |app: &mut App| {
-            app.insert_resource(model.clone()).add_plugins(CloudsPlugin);
-        });
+        let mut app = BELOW.slab().traced_app();
         let sun = spawn_sun(&mut app, Vec3::NEG_Y);
         let view = spawn_view(&mut app, UVec2::new(24, 16), Transform::default(), Sky::Black);
         let narrow = PerspectiveProjection { fov: 0.002, ..default() };
@@ -161,7 +162,7 @@ impl Stage {
         let from = Transform::from_xyz(0.0, look.height as f32, 0.0);
         let pose = from.looking_to(look.direction.as_vec3(), up);
         self.app.world_mut().entity_mut(self.view.camera).insert(pose);
-        self.app.insert_resource(quality);
+        self.app.insert_resource(quality).insert_resource(look.slab().settings());
         run_updates(&mut self.app, 1);
         mean(&mut self.app, &self.view, frames)[1]
     }

@@ -11,7 +11,7 @@ use bevy::{
 use bevy_cumulus::prelude::*;
 
 use crate::support::{
-    app::{Sky, View, cloud_pixels, new_clouds_app, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, View, cloud_pixels, new_clouds_app, spawn_sun, spawn_view, until_baked, until_drawn},
     gpu::run_updates,
     scene::{CLEAR, exact, greatest_difference, linear_pixels, settle, slab_app, spawn_linear},
     uniform_slab::UniformSlab,
@@ -43,6 +43,7 @@ fn every_view_is_finite_and_its_own_and_none_is_as_before() {
     for sky in [Sky::Black, Sky::Atmosphere] {
         // New: how many shaders it makes is counted.
         let mut app = new_clouds_app();
+        until_baked(&mut app);
         spawn_sun(&mut app, Vec3::new(0.3, -0.6, 1.0));
         let looking = Transform::from_xyz(0.0, 10.0, 0.0).looking_to(Vec3::new(0.0, 0.5, -1.0), Vec3::Y);
         let view = spawn_view(&mut app, UVec2::new(32, 18), looking, sky);

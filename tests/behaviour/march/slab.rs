@@ -4,8 +4,6 @@
 //! What is drawn is stored as f16. A device may round or cut (Mesa's software driver cuts): up to 2⁻¹⁰ = 9.8e-4 of the
 //! value.
 
-use std::path::Path;
-
 use bevy::{math::DVec3, prelude::*};
 use bevy_cumulus::prelude::*;
 
@@ -192,63 +190,5 @@ fn a_model_may_come_after_the_plugin_and_change() {
         // And it stays.
         run_updates(&mut app, 4);
         assert!(matches(&app, extinction), "the slab of {extinction}/m is gone again");
-    }
-}
-
-/// Every `.rs` and `.wesl` file below a folder, with its text.
-fn sources(folder: &Path) -> Vec<(String, String)> {
-    let mut found = Vec::new();
-    for entry in std::fs::read_dir(folder).expect("the folder is there") {
-        let path = entry.expect("it can be read").path();
-        if path.is_dir() {
-            found.extend(sources(&path));
-        } else if path.extension().is_some_and(|e| e == "rs" || e == "wesl") {
-            let text = std::fs::read_to_string(&path).expect("a source is text");
-            found.push((path.display().to_string(), text));
-        }
-    }
-    found
-}
-
-#[test]
-fn the_model_knows_nothing_of_the_renderer() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let model = sources(&root.join("model"));
-    assert!(model.len() >= 6, "only {} files of the model", model.len());
-    for (path, text) in &model {
-        for forbidden in ["crate::render", "super::render", "package::render", "bevy_cumulus::render", "bevy_pbr"] {
-            assert!(!text.contains(forbidden), "{path} mentions {forbidden}");
-        }
-    }
-    // And the renderer's shaders know of the model what medium.wesl says, and the planet it stands on.
-    for (path, text) in sources(&root.join("render")).iter().filter(|(path, _)| path.ends_with(".wesl")) {
-        assert!(!text.contains("@group(1)"), "{path} binds the model's group");
-        let imports = text.split("import ").skip(1).filter_map(|rest| rest.split(';').next());
-        for import in imports.filter(|import| import.contains("model")) {
-            for name in import.split([':', '{', '}', ',', ' ', '\n']).filter(|name| !name.is_empty()) {
-                let known = [
-                    "package",
-                    "bevy_cumulus",
-                    "model",
-                    "medium",
-                    "Medium",
-                    "planet",
-                    "MOST_DECKS",
-                    "model_bounds",
-                    "model_deck",
-                    "model_part",
-                    "sample_part",
-                    "density_bound",
-                    "sample_medium",
-                    "empty_medium",
-                    "shell_intervals",
-                    "shell_roots",
-                    "altitude",
-                    "up_at",
-                    "debug_value",
-                ];
-                assert!(known.contains(&name), "{path} imports {name} of the model");
-            }
-        }
     }
 }

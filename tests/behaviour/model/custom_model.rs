@@ -5,8 +5,8 @@ use bevy_cumulus::{CloudsPlugin, ModelShader, ModelShaderError, prelude::*};
 use rand::{SeedableRng, rngs::StdRng};
 
 use crate::support::{
-    app::{new_clouds_app, new_clouds_app_with, spawn_sun, until_drawn},
-    density::{Question, ask, question, until_baked},
+    app::{new_clouds_app, new_clouds_app_with, spawn_sun, until_baked, until_drawn},
+    density::{Question, ask, question},
     gpu::{assert_shaders_compile, run_updates, times_logged},
     scene::{exact, linear_pixels, settle, spawn_linear},
     uniform_slab::slab_text,

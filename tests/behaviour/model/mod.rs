@@ -4,5 +4,6 @@ mod cpu_parity;
 mod custom_model;
 mod density_bound;
 pub mod layers;
+mod seam;
 mod shell_intervals;
 mod zones;

@@ -4,6 +4,7 @@ use bevy::{
     app::Plugins,
     camera::{Exposure, RenderTarget},
     light::{Atmosphere, atmosphere::ScatteringMedium, light_consts::lux},
+    math::DVec3,
     pbr::AtmosphereSettings,
     prelude::*,
     render::{
@@ -17,7 +18,7 @@ use bevy::{
         texture::GpuImage,
     },
 };
-use bevy_cumulus::prelude::*;
+use bevy_cumulus::{prelude::*, testing::model_bindings, textures::CloudTextureStatus};
 
 use super::{
     gpu::{
@@ -126,6 +127,17 @@ pub fn until_drawn(app: &mut App) {
         assert_shaders_compile(app);
         app.world().resource::<CloudStatus>().is_ready() && pipelines_are_there(app)
     });
+}
+
+/// Runs frames until the textures that are asked for now are baked.
+pub fn until_baked(app: &mut App) {
+    let is_baked = |app: &mut App| {
+        !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
+    };
+    run_until(app, "the textures are baked", 600, is_baked);
+    // Those that small sizes ask for are begun after the first ones.
+    run_updates(app, 3);
+    run_until(app, "the textures are baked", 600, is_baked);
 }
 
 /// The resolved clouds of the last frame, row by row from the top left: radiance (cd/m²) and transmittance.

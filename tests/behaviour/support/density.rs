@@ -1,14 +1,13 @@
 //! The built-in model asked for densities and their bounds, without a camera.
 
 use bevy::{math::DVec3, prelude::*};
+use bevy_cumulus::prelude::*;
 use bevy_cumulus::testing::model_bindings;
-use bevy_cumulus::{prelude::*, textures::CloudTextureStatus};
 use rand::{Rng, rngs::StdRng};
 
 use super::{
-    app::clouds_app,
+    app::{clouds_app, until_baked},
     evaluate::on_gpu_with,
-    gpu::{run_until, run_updates},
     shared::SharedApp,
 };
 
@@ -35,16 +34,6 @@ pub fn model_app() -> SharedApp {
     let mut app = clouds_app();
     until_baked(&mut app);
     app
-}
-
-/// Runs frames until the textures are baked.
-pub fn until_baked(app: &mut App) {
-    run_until(app, "the textures are baked", 600, |app| {
-        !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
-    });
-    // So that the baking that the small sizes ask for has begun, and ended.
-    run_updates(app, 3);
-    run_until(app, "the textures are baked", 600, |app| !app.world().resource::<CloudTextureStatus>().baking);
 }
 
 pub fn ask(app: &mut App, model: &CloudModel, questions: &[Question]) -> Vec<Answer> {

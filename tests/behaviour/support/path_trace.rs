@@ -23,13 +23,11 @@ pub fn slab(depth: f64, albedo: [f64; 3]) -> UniformSlab {
 
 /// The same, with these shares of the phase functions.
 pub fn mixed_slab(depth: f64, albedo: [f64; 3], phase: [f64; 4]) -> UniformSlab {
+    let (bottom, top) = (BOTTOM as f32, (BOTTOM + THICKNESS) as f32);
     UniformSlab {
-        bottom: BOTTOM as f32,
-        top: (BOTTOM + THICKNESS) as f32,
-        extinction: (depth / THICKNESS) as f32,
         albedo: DVec3::from_array(albedo).as_vec3(),
         phase: phase.map(|share| share as f32),
-        densities: [1.0; 2],
+        ..UniformSlab::new(bottom, top, (depth / THICKNESS) as f32)
     }
 }
 

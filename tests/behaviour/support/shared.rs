@@ -14,7 +14,10 @@ use std::{
 use bevy::{app::SubApps, light::Atmosphere, prelude::*, time::TimeUpdateStrategy};
 use bevy_cumulus::{CloudPhaseStatus, CloudPhaseTables, ModelPhases, prelude::*};
 
-use super::gpu::{run_until, run_updates};
+use super::{
+    app::until_baked,
+    gpu::{run_until, run_updates},
+};
 
 /// What there is of a kind.
 #[derive(Default)]
@@ -72,9 +75,10 @@ impl SharedApp {
             Some(sub_apps) => *shared.app.sub_apps_mut() = sub_apps,
             None => shared.app = new(),
         }
-        shared.works = true;
         let textures = shared.textures.clone();
         shared.insert_resource(textures);
+        until_baked(&mut shared);
+        shared.works = true;
         shared
     }
 

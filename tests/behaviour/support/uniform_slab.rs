@@ -13,22 +13,27 @@ fn model_bounds() -> vec2<f32> {
     return vec2(model.bottom, model.top);
 }
 
-fn density_bound(p: vec3<f32>, lod: f32) -> f32 {
+// Whether p is in the cloud, or within `reach` of it.
+fn is_near(p: vec3<f32>, reach: f32) -> bool {
     let h = altitude(p, model.radius);
-    let reach = exp2(lod);
-    return select(0.0, 1.0, h + reach >= model.bottom && h - reach <= model.top);
+    let aside = length(p.xz - vec2(model.skew * (model.top - model.bottom), 0.0));
+    let is_within = model.coverage == 0.0 || aside <= 1.0 / model.billow_rate + reach;
+    return is_within && h + reach >= model.bottom && h - reach <= model.top;
 }
 
-// Twice what is needed, so that null collisions happen.
+fn density_bound(p: vec3<f32>, lod: f32) -> f32 {
+    return select(0.0, 1.0, is_near(p, exp2(lod)));
+}
+
 fn extinction_bound(p: vec3<f32>, lod: f32) -> f32 {
-    return 2.0 * model.extinction;
+    return select(0.0, model.density * model.density * model.extinction, is_near(p, exp2(lod)));
 }
 
 fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {
-    let h = altitude(p, model.radius);
-    if h < model.bottom || h > model.top {
+    if !is_near(p, 0.0) {
         return empty_medium();
     }
+    let h = altitude(p, model.radius);
     let density = select(model.wisp_height, model.detail_strength, h < 0.5 * (model.bottom + model.top));
     return Medium(density, model.extinction, model.albedo.rgb, 0.5, vec2(h - model.bottom, model.top - h),
         vec4(model.cloud_type, model.type_variation, model.map_variation, model.noise_strength));
@@ -47,18 +52,33 @@ pub struct UniformSlab {
     pub phase: [f32; 4],
     /// Densities of the lower and of the upper half. The extinction does not follow them.
     pub densities: [f32; 2],
+    /// Where it does not reach everywhere: the radius of the disc that it fills, and how far along +x from the camera's
+    /// axis its middle is (m).
+    pub disc: Option<[f32; 2]>,
+    /// The path tracer's majorant, in the extinction: over 1, so that null collisions happen.
+    pub majorant: f32,
 }
 
 impl UniformSlab {
     /// White droplets of the first phase function.
     pub fn new(bottom: f32, top: f32, extinction: f32) -> Self {
-        Self { bottom, top, extinction, albedo: Vec3::splat(0.99), phase: [1.0, 0.0, 0.0, 0.0], densities: [1.0; 2] }
+        Self {
+            bottom,
+            top,
+            extinction,
+            albedo: Vec3::splat(0.99),
+            phase: [1.0, 0.0, 0.0, 0.0],
+            densities: [1.0; 2],
+            disc: None,
+            majorant: 2.0,
+        }
     }
 
     /// The settings that its shader reads.
     pub fn settings(&self) -> CloudModel {
         let [cloud_type, type_variation, map_variation, noise_strength] = self.phase;
         let [detail_strength, wisp_height] = self.densities;
+        let [billow_scale, wind_skew] = self.disc.unwrap_or([1000.0, 0.0]);
         let Self { bottom, top, extinction, albedo, .. } = *self;
         CloudModel {
             bottom,
@@ -71,6 +91,10 @@ impl UniformSlab {
             noise_strength,
             detail_strength,
             wisp_height,
+            billow_scale,
+            wind_skew,
+            coverage: if self.disc.is_some() { 1.0 } else { 0.0 },
+            density: self.majorant.sqrt(),
             ..default()
         }
     }
