@@ -14,7 +14,8 @@ use crate::support::{
     app::{Sky, cloud_pixels, read_image, spawn_sun, spawn_view},
     gpu::{run_compute, run_updates, shader_app},
     path_trace::{
-        SKY, THICKNESS, assert_near, light_from, mean, sky_light, slab, spawn_pinhole, sun_light, traced_app,
+        SKY, THICKNESS, assert_near, frames, light_from, mean, noise, sky_light, slab, spawn_pinhole, sun_light,
+        traced_app,
     },
     scene::{settle, spawn_box},
 };
@@ -124,10 +125,10 @@ fn a_half_space_reflects_as_chandrasekhar_says() {
         let mut app = traced_app(Some(slab(80.0, albedo)), sky_light(PhaseFunction::Isotropic));
         spawn_sun(&mut app, Vec3::NEG_Y);
         let view = spawn_pinhole(&mut app, UVec2::new(128, 96), -mu);
-        let found = mean(&mut app, &view, 24);
+        let found = mean(&mut app, &view, frames(24));
         for (found, albedo) in found.into_iter().zip(albedo) {
             let plane_albedo = 1.0 - (1.0 - albedo).sqrt() * h_function(albedo)(mu);
-            assert_near(found / SKY, plane_albedo, 0.01, &format!("sky, albedo {albedo}, μ {mu}"));
+            assert_near(found / SKY, plane_albedo, noise(), &format!("sky, albedo {albedo}, μ {mu}"));
         }
     }
     for mu_sun in [0.3, 0.8] {
@@ -135,12 +136,12 @@ fn a_half_space_reflects_as_chandrasekhar_says() {
         spawn_sun(&mut app, light_from(mu_sun));
         let mu = 0.7;
         let view = spawn_pinhole(&mut app, UVec2::new(96, 64), -mu);
-        let found = mean(&mut app, &view, 24);
+        let found = mean(&mut app, &view, frames(24));
         for (found, albedo) in found.into_iter().zip(albedo) {
             let h = h_function(albedo);
             let factor = albedo / (4.0 * PI) * mu_sun / (mu + mu_sun) * h(mu) * h(mu_sun);
             let expected = f64::from(lux::RAW_SUNLIGHT) * factor;
-            assert_near(found, expected, 0.01, &format!("sun at {mu_sun}, albedo {albedo}"));
+            assert_near(found, expected, noise(), &format!("sun at {mu_sun}, albedo {albedo}"));
         }
     }
 }
@@ -173,11 +174,11 @@ fn finite_slabs_reflect_and_transmit_as_adding_says() {
                 spawn_sun(&mut app, Vec3::NEG_Y);
                 let view = spawn_pinhole(&mut app, UVec2::new(128, 96), up * mu);
                 // Little comes through the thick one at the least albedo: one path in seventy.
-                let frames = if depth > 1.0 && up > 0.0 { 192 } else { 32 };
-                let found = mean(&mut app, &view, frames);
+                let count = if depth > 1.0 && up > 0.0 { 192 } else { 32 };
+                let found = mean(&mut app, &view, frames(count));
                 for (found, slab) in found.into_iter().zip(&slabs) {
                     let side = if up > 0.0 { slab.sky_scattered_through() } else { slab.sky_reflected() };
-                    assert_near(found / SKY, side, 0.01, &format!("{phase:?}, τ {depth}, μ {}", up * mu));
+                    assert_near(found / SKY, side, noise(), &format!("{phase:?}, τ {depth}, μ {}", up * mu));
                 }
             }
         }
@@ -200,11 +201,11 @@ fn sunlight_through_droplets_is_what_adding_says() {
         let mut app = traced_app(Some(slab(depth, albedo)), lighting);
         spawn_sun(&mut app, light_from(mu));
         let view = spawn_pinhole(&mut app, UVec2::new(128, 96), up);
-        let found = mean(&mut app, &view, 160);
+        let found = mean(&mut app, &view, frames(160));
         for (found, slab) in found.into_iter().zip(&slabs) {
             let [above, below] = slab.sun_seen_vertically();
             let expected = f64::from(lux::RAW_SUNLIGHT) * if up > 0.0 { below } else { above };
-            assert_near(found, expected, 0.01, &format!("sun through droplets, looking {up}"));
+            assert_near(found, expected, noise(), &format!("sun through droplets, looking {up}"));
         }
     }
 }

@@ -11,7 +11,7 @@ use crate::support::{
     adding_doubling::{Slab, moments},
     app::{View, cloud_pixels, spawn_sun, until_drawn},
     gpu::{run_updates, times_logged},
-    path_trace::{assert_near, light_from, mean, mixed_slab, spawn_pinhole, sun_light, traced_app},
+    path_trace::{assert_near, frames, light_from, mean, mixed_slab, noise, spawn_pinhole, sun_light, traced_app},
 };
 
 pub fn of(function: PhaseFunction, g: f32) -> CloudPhase {
@@ -110,8 +110,8 @@ fn the_path_tracer_mixes_phase_functions_as_adding_says() {
         app.insert_resource(ModelPhases(vec![of(PhaseFunction::Rayleigh, 0.0), small]));
         spawn_sun(&mut app, light_from(mu));
         let view = spawn_pinhole(&mut app, UVec2::new(128, 96), up);
-        let [found, ..] = mean(&mut app, &view, 120);
+        let [found, ..] = mean(&mut app, &view, frames(120));
         let expected = f64::from(lux::RAW_SUNLIGHT) * if up > 0.0 { below } else { above };
-        assert_near(found, expected, 0.01, &format!("looking {up}"));
+        assert_near(found, expected, noise(), &format!("looking {up}"));
     }
 }

@@ -14,3 +14,8 @@ pub mod shared;
 pub mod slab;
 pub mod temporal_modes;
 pub mod uniform_slab;
+
+/// Whether tests are to be thorough however long they take (`scripts/test --full`), not only quick.
+pub fn full() -> bool {
+    std::env::var("CUMULUS_FULL").is_ok_and(|full| full == "1")
+}

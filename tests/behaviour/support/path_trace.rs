@@ -5,6 +5,7 @@ use bevy_cumulus::prelude::*;
 
 use super::{
     app::{Sky, View, cloud_pixels, new_clouds_app, spawn_view, until_drawn},
+    full,
     gpu::run_updates,
     shared::SharedApp,
     uniform_slab::UniformSlab,
@@ -79,6 +80,16 @@ pub fn mean(app: &mut App, view: &View, frames: u32) -> [f64; 4] {
     let pixels = cloud_pixels(app, view);
     let sum = pixels.iter().fold([0.0; 4], |sum, p| std::array::from_fn(|i| sum[i] + f64::from(p[i])));
     sum.map(|s| s / pixels.len() as f64)
+}
+
+/// Frames for a mean that is known to 1 % of itself by `scripts/test --full`: otherwise a quarter of them.
+pub fn frames(full_count: u32) -> u32 {
+    if full() { full_count } else { full_count.div_ceil(4) }
+}
+
+/// How far such a mean may be off, as a share of itself: a quarter of the samples has twice the noise.
+pub fn noise() -> f64 {
+    if full() { 0.01 } else { 0.02 }
 }
 
 pub fn assert_near(found: f64, expected: f64, relative: f64, what: &str) {
