@@ -11,6 +11,7 @@ mod coexist;
 mod debug_views;
 mod drift;
 mod field;
+mod frozen_presets;
 mod goldens;
 mod gpu;
 mod halves;
