@@ -44,7 +44,11 @@ pub mod settings;
 pub mod textures;
 pub mod weather;
 
-use bevy::{prelude::*, render::RenderApp, shader::ShaderLoader};
+use bevy::{
+    prelude::*,
+    render::RenderApp,
+    shader::{ShaderLoader, load_shader_library},
+};
 
 pub use model::{ModelShader, ModelShaderError};
 pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
@@ -52,7 +56,7 @@ pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
 };
-pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
+pub use render::{CloudBuffer, CloudCounts, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
     CloudPreset, CloudPresetFile, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView,
@@ -87,6 +91,7 @@ impl Plugin for CloudsPlugin {
         if !app.world().contains_resource::<Assets<Image>>() {
             app.init_asset::<Image>();
         }
+        load_shader_library!(app, "counts.wesl");
         app.add_plugins((
             settings::CloudSettingsPlugin,
             textures::CloudTexturesPlugin,

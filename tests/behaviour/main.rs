@@ -22,6 +22,7 @@ mod large_world;
 mod layers;
 mod many_cameras;
 mod map_files;
+mod march_counts;
 mod march_steps;
 mod modes;
 mod motion;
