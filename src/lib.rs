@@ -58,7 +58,11 @@ pub mod testing;
 pub mod textures;
 pub mod weather;
 
-use bevy::{prelude::*, render::RenderApp, shader::ShaderLoader};
+use bevy::{
+    prelude::*,
+    render::RenderApp,
+    shader::{ShaderLoader, load_shader_library},
+};
 
 pub use model::{ModelShader, ModelShaderError};
 pub use phases::{CloudPhaseStatus, CloudPhaseTable, CloudPhaseTables};
@@ -66,7 +70,7 @@ pub use reference::{
     keeper::{CloudField, CloudFieldError, CloudFieldPlugin},
     query::CloudSky,
 };
-pub use render::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
+pub use render::{CloudBuffer, CloudCounts, CloudDepth, CloudFrame, CloudNoise, CloudStatus};
 pub use settings::{
     CloudClock, CloudDebugView, CloudLayer, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase,
     CloudPreset, CloudPresetFile, CloudQuality, CloudSettings, CloudTextureSlots, CloudTextures, CloudView,
@@ -115,6 +119,7 @@ impl Plugin for CloudsPlugin {
         let shader = Shader::from_wesl(PUBLIC_SHADER, PUBLIC_SHADER_PATH);
         let shader = app.world_mut().resource_mut::<Assets<Shader>>().add(shader);
         app.insert_resource(PublicShader { _shader: shader });
+        load_shader_library!(app, "counts.wesl");
         app.add_plugins((
             settings::CloudSettingsPlugin,
             textures::CloudTexturesPlugin,

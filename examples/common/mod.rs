@@ -64,7 +64,7 @@ const EVERYDAY: Scene = Scene {
 };
 
 /// The everyday scenes. The ground, the sun and Bevy's atmosphere are in each.
-const SCENES: [Scene; 12] = [
+const SCENES: [Scene; 14] = [
     Scene {
         name: "ground_noon",
         preset: "FairWeather",
@@ -100,6 +100,20 @@ const SCENES: [Scene; 12] = [
         camera: CameraPose::new(0.0, 420.0, 0.0, 0.0, 9.0),
         sun: SunPose::new(38.0, 115.0),
         hills: true,
+        ..EVERYDAY
+    },
+    Scene {
+        name: "broken",
+        preset: "Broken",
+        camera: CameraPose::new(0.0, 2.0, 0.0, 0.0, 16.0),
+        sun: SunPose::new(50.0, 130.0),
+        ..EVERYDAY
+    },
+    Scene {
+        name: "storm",
+        preset: "Storm",
+        camera: CameraPose::new(0.0, 2.0, 0.0, 0.0, 14.0),
+        sun: SunPose::new(35.0, 60.0),
         ..EVERYDAY
     },
     Scene { name: "inside", camera: CameraPose::new(0.0, 2100.0, 0.0, 40.0, 4.0), ..EVERYDAY },

@@ -26,7 +26,7 @@ pub fn plans(file: &Path) -> Result<Vec<Plan>> {
         let line_options = Options::try_parse_from(all).with_context(at)?;
         ensure!(line_options.batch.is_none() && !line_options.list && !line_options.effective, "{}: no picture", at());
         let plan = line_options.plan().with_context(at)?;
-        ensure!(!plan.files().is_empty(), "{}: give --out, --cloud or --timings", at());
+        ensure!(!plan.files().is_empty(), "{}: give --out, --cloud, --timings or --counts", at());
         ensure!(plan.strip.is_empty(), "{}: scene {} is a strip of pictures", at(), plan.scene.name);
         if let Some(first) = plans.first() {
             let differs = plan.differs_in_setup(first);
@@ -38,12 +38,12 @@ pub fn plans(file: &Path) -> Result<Vec<Plan>> {
     Ok(plans)
 }
 
-/// The command line without `--batch FILE`.
+/// The command line without `--batch FILE` and `--paced`, which goes with it.
 fn given_besides_batch() -> Vec<String> {
     let mut given = Vec::new();
     let mut skip = false;
     for word in std::env::args() {
-        if std::mem::take(&mut skip) || word.starts_with("--batch=") {
+        if std::mem::take(&mut skip) || word.starts_with("--batch=") || word == "--paced" {
             continue;
         }
         if word == "--batch" {
@@ -55,10 +55,18 @@ fn given_besides_batch() -> Vec<String> {
     given
 }
 
-/// Renders and writes all of them; each one done is a line on stdout.
-pub fn shoot(plans: &[Plan]) -> Result<()> {
+/// Renders and writes all of them; each one done is a line on stdout. With `paced` each waits for a line on stdin.
+pub fn shoot(plans: &[Plan], paced: bool) -> Result<()> {
     let mut count = 0;
-    shoot::shoot_many(plans, |plan, shot| {
+    let wait = || -> Result<()> {
+        let mut line = String::new();
+        ensure!(
+            !paced || std::io::stdin().read_line(&mut line)? > 0,
+            "--paced: standard input ended before the last picture"
+        );
+        Ok(())
+    };
+    shoot::shoot_many(plans, wait, |plan, shot| {
         output::write(plan, shot)?;
         count += 1;
         let name = plan.files().first().map(|(_, path, _)| path.display().to_string()).unwrap_or_default();

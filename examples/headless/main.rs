@@ -43,7 +43,7 @@ fn run(options: &Options) -> Result<()> {
         for plan in &plans {
             check_files(plan)?;
         }
-        return guarded(|| batch::shoot(&plans));
+        return guarded(|| batch::shoot(&plans, options.paced));
     }
     let plan = options.plan()?;
     if options.list {
@@ -56,7 +56,7 @@ fn run(options: &Options) -> Result<()> {
         if options.list {
             return Ok(());
         }
-        bail!("nothing to do: give --out, --cloud, --timings, --list or --effective");
+        bail!("nothing to do: give --out, --cloud, --timings, --counts, --list or --effective");
     }
     check_files(&plan)?;
     let shot = guarded(|| shoot::shoot(&plan))?;

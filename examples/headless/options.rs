@@ -29,10 +29,14 @@ pub struct Options {
     /// share size, textures, sky and what stands on the ground; nothing is quoted, `#` begins a comment
     #[arg(long, value_name = "FILE", conflicts_with_all = ["list", "effective"])]
     pub batch: Option<PathBuf>,
+    /// With --batch: begin each picture only when a line comes in on standard input, so that two programs can take turns
+    #[arg(long, requires = "batch")]
+    pub paced: bool,
     #[command(flatten)]
     pub start: StartOptions,
     /// Show one stage of the clouds instead: coverage_map, type_map, dimensional_profile, eroded_density,
-    /// single_scattering, multiple_scattering, no_phase, steps, transmittance, cloud_depth, single_frame, or none
+    /// single_scattering, multiple_scattering, no_phase, steps, transmittance, cloud_depth, single_frame, or none;
+    /// for programs step_count, sample_count, read_count (see --counts)
     #[arg(long, value_name = "NAME", value_parser = debug_view)]
     pub debug: Option<CloudDebugView>,
     /// Size of the picture in pixels, each side from 1 to 8192; of each picture, where a scene is a strip of some
@@ -73,6 +77,10 @@ pub struct Options {
     /// Write what each pass and the whole frame took (ms)
     #[arg(long, value_name = "T.json")]
     pub timings: Option<PathBuf>,
+    /// Write what the rays of the last frame did: their steps, media sampled and textures read, all together, a ray's mean
+    /// and the most of one. They repeat from run to run
+    #[arg(long, value_name = "C.json")]
+    pub counts: Option<PathBuf>,
 }
 
 fn debug_view(text: &str) -> Result<CloudDebugView, String> {
@@ -98,6 +106,9 @@ fn ev100(text: &str) -> Result<f32, String> {
     number.map(|n| n as f32).ok_or_else(|| "expected a number from -10 to 30".to_owned())
 }
 
+/// Frames of a history that counts tell apart (see `CloudCounts`).
+const MOST_COUNTED: u32 = 2047;
+
 /// What is to be rendered, with every default filled in and every value checked.
 pub struct Plan {
     pub scene: Scene,
@@ -117,6 +128,7 @@ pub struct Plan {
     pub cloud: Option<PathBuf>,
     pub noise: Option<PathBuf>,
     pub timings: Option<PathBuf>,
+    pub counts: Option<PathBuf>,
     camera: CameraPose,
     travel: [f32; 5],
     sun: SunPose,
@@ -133,9 +145,9 @@ impl Options {
         if !strip.is_empty() {
             let pictures = strip.len() as u32;
             ensure!(
-                self.cloud.is_none() && self.noise.is_none() && self.timings.is_none(),
-                "--scene {}: a strip of {pictures} pictures has no single cloud buffer, noise and timings; leave --cloud, \
-                 --noise and --timings out",
+                [&self.cloud, &self.noise, &self.timings, &self.counts].iter().all(|file| file.is_none()),
+                "--scene {}: a strip of {pictures} pictures has no single cloud buffer, noise, timings and counts; leave \
+                 --cloud, --noise, --timings and --counts out",
                 scene.name
             );
             ensure!(
@@ -147,6 +159,15 @@ impl Options {
         ensure!(
             self.noise.is_none() || settings.quality.method == CloudMethod::PathTrace,
             "--noise: only --quality reference (or quality.method = PathTrace) knows its noise"
+        );
+        ensure!(
+            self.counts.is_none() || (settings.quality.method == CloudMethod::March && !scene.split),
+            "--counts: only one camera's march has rays to count, not the path tracer, nor a scene of two cameras"
+        );
+        ensure!(
+            self.counts.is_none() || self.frames <= MOST_COUNTED,
+            "--counts: takes at most {MOST_COUNTED} frames (--frames {})",
+            self.frames
         );
         Ok(Plan {
             scene,
@@ -166,6 +187,7 @@ impl Options {
             cloud: self.cloud.clone(),
             noise: self.noise.clone(),
             timings: self.timings.clone(),
+            counts: self.counts.clone(),
             travel: self.travel.unwrap_or_default(),
             sun_move: self.sun_move.unwrap_or_default(),
             dt: self.dt,
@@ -212,6 +234,7 @@ impl Plan {
             ("--cloud", &self.cloud, "exr"),
             ("--noise", &self.noise, "exr"),
             ("--timings", &self.timings, "json"),
+            ("--counts", &self.counts, "json"),
         ];
         all.into_iter().filter_map(|(option, path, kind)| Some((option, path.as_deref()?, kind))).collect()
     }

@@ -13,7 +13,7 @@ use serde_json::Value;
 
 use crate::{
     options::{Effective, Plan},
-    shoot::Shot,
+    shoot::{Counts, Shot},
 };
 
 /// The timings file. A struct, since JSON values would widen every f32.
@@ -24,6 +24,16 @@ struct Report<'a> {
     settings: Effective<'a>,
     passes: Value,
     frame: Value,
+}
+
+/// The counts file.
+#[derive(Serialize)]
+struct Counted<'a> {
+    adapter: &'a str,
+    size: (u32, u32),
+    settings: Effective<'a>,
+    #[serde(flatten)]
+    counts: &'a Counts,
 }
 
 /// Says before the work whether the file can be written after it.
@@ -64,6 +74,11 @@ pub fn write(plan: &Plan, shot: &Shot) -> Result<()> {
         let (passes, frame) = shot.timings.to_json();
         let settings = plan.effective();
         let all = Report { adapter: &shot.adapter, size: plan.size, settings, passes, frame };
+        put(path, serde_json::to_string_pretty(&all)?.as_bytes())?;
+    }
+    if let Some(path) = &plan.counts {
+        let counts = shot.counts.as_ref().ok_or_else(|| anyhow!("--counts: no counts came back"))?;
+        let all = Counted { adapter: &shot.adapter, size: plan.size, settings: plan.effective(), counts };
         put(path, serde_json::to_string_pretty(&all)?.as_bytes())?;
     }
     match &shot.flaw {

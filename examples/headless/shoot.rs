@@ -1,5 +1,7 @@
 //! Renders the plan's frames in lock-step, without a window, and reads the last one back.
 
+mod counts;
+
 use std::time::{Duration, Instant};
 
 use anyhow::{Result, anyhow, bail, ensure};
@@ -34,6 +36,8 @@ use crate::{
     timings::{LAG, Timings},
 };
 
+pub use counts::Counts;
+
 /// How long the first usable frame may take to come, and the last one to come back.
 const READY_WITHIN: Duration = Duration::from_secs(300);
 const BACK_WITHIN: Duration = Duration::from_secs(120);
@@ -50,6 +54,7 @@ pub struct Shot {
     /// Which of the floats behind the picture are none, in words.
     pub flaw: Option<String>,
     pub timings: Timings,
+    pub counts: Option<Counts>,
     pub adapter: String,
 }
 
@@ -60,6 +65,7 @@ struct Caught {
     cloud: Option<Vec<u8>>,
     second_cloud: Option<Vec<u8>>,
     noise: Option<Vec<u8>>,
+    frame: Option<Vec<u8>>,
 }
 
 /// Renders the plan.
@@ -68,12 +74,17 @@ pub fn shoot(plan: &Plan) -> Result<Shot> {
     if plan.strip.is_empty() { studio.picture(plan) } else { studio.strip(plan) }
 }
 
-/// Renders plans that share a set-up, one after another, and hands each picture on.
-pub fn shoot_many(plans: &[Plan], mut done: impl FnMut(&Plan, &Shot) -> Result<()>) -> Result<()> {
+/// Renders plans that share a set-up, one after another, and hands each picture on; `wait` comes before each.
+pub fn shoot_many(
+    plans: &[Plan],
+    mut wait: impl FnMut() -> Result<()>,
+    mut done: impl FnMut(&Plan, &Shot) -> Result<()>,
+) -> Result<()> {
     let Some(first) = plans.first() else { return Ok(()) };
     let mut studio = Studio::build(plans)?;
     studio.make_ready(first, SETTLING_FRAMES)?;
     for plan in plans {
+        wait()?;
         set(studio.app.world_mut(), &plan.settings);
         studio.expose(plan);
         studio.pose(plan, 0);
@@ -396,7 +407,8 @@ impl Studio {
         let info = world.resource::<RenderAdapterInfo>();
         let adapter = format!("{} ({:?})", info.name, info.backend);
         let picture = picture.map(|picture| picture.to_rgb8());
-        Ok(Shot { picture, cloud, noise, flaw, timings, adapter })
+        let counts = plan.counts.is_some().then(|| self.counts(plan)).transpose()?;
+        Ok(Shot { picture, cloud, noise, flaw, timings, counts, adapter })
     }
 }
 

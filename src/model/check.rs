@@ -28,8 +28,9 @@ pub(super) enum Verdict {
 }
 
 /// Modules that a model may import, as they were when the crate was built: at the app's start they are not loaded yet.
-const LIBRARY: [(&str, &str); 9] = [
+const LIBRARY: [(&str, &str); 10] = [
     (PUBLIC_SHADER_PATH, PUBLIC_SHADER),
+    ("embedded://bevy_cumulus/counts.wesl", include_str!("../counts.wesl")),
     ("embedded://bevy_cumulus/model/medium.wesl", include_str!("medium.wesl")),
     ("embedded://bevy_cumulus/model/planet.wesl", include_str!("planet.wesl")),
     ("embedded://bevy_cumulus/model/data.wesl", include_str!("data.wesl")),

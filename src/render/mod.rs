@@ -2,6 +2,7 @@
 
 mod bind_groups;
 mod buffer;
+mod counts;
 mod frame;
 pub(crate) mod history;
 mod order;
@@ -33,6 +34,7 @@ use bevy::{
 use crate::model::ModelBindings;
 
 pub use buffer::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise};
+pub use counts::CloudCounts;
 pub(crate) use frame::FrameUniform;
 pub(crate) use phase_slots::{PHASE_SLOTS, phase_tables_layout};
 pub(crate) use pipelines::{CloudPipelines, depth_layout};
@@ -54,6 +56,7 @@ impl Plugin for CloudRenderPlugin {
         load_shader_library!(app, "march/lighting.wesl");
         load_shader_library!(app, "march/aerial.wesl");
         load_shader_library!(app, "march/debug.wesl");
+        load_shader_library!(app, "march/count.wesl");
         load_shader_library!(app, "march/past.wesl");
         load_shader_library!(app, "march/limit.wesl");
         load_shader_library!(app, "march/far.wesl");

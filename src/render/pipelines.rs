@@ -48,8 +48,9 @@ impl Variant {
             ("ATMOSPHERE", self.atmosphere),
             ("AIR_MARCHED", self.atmosphere && air_marched),
             ("MULTISAMPLED", self.multisampled),
-            ("DEBUG_VIEW", self.debug != DebugShader::None),
+            ("DEBUG_VIEW", self.debug.shows_values()),
             ("DEBUG_MAP", self.debug == DebugShader::Map),
+            ("COUNTS", self.debug == DebugShader::Count),
         ];
         all.into_iter().filter(|(_, on)| *on).map(|(name, _)| name.into()).collect()
     }

@@ -44,6 +44,15 @@ pub enum CloudDebugView {
     CloudDepth,
     /// One frame, without the sliding window.
     SingleFrame,
+    /// For programs: how many steps each ray took, exactly. The march does all that it does for finished clouds and writes
+    /// the count in the light's place; [`CloudCounts`](crate::CloudCounts) reads it from a
+    /// [`CloudFrame`](crate::CloudFrame). Shader, as of the next two.
+    StepCount,
+    /// For programs: how many times each ray asked the model for a medium, towards the light included.
+    SampleCount,
+    /// For programs: how many textures each ray read (a sample or load is one, however it is filtered): the model's and the
+    /// march's own. What a [`ModelShader`](crate::ModelShader) reads by itself is not counted.
+    ReadCount,
 }
 
 /// Which march shader a debug view needs.
@@ -56,11 +65,20 @@ pub(crate) enum DebugShader {
     March,
     /// With `DEBUG_MAP` too, which asks the model for `debug_value`.
     Map,
+    /// The normal one with `COUNTS`.
+    Count,
+}
+
+impl DebugShader {
+    /// Whether it shows a value of the march, for which no cloud is lit.
+    pub(crate) fn shows_values(self) -> bool {
+        matches!(self, Self::March | Self::Map)
+    }
 }
 
 impl CloudDebugView {
     /// All of them, [`None`](Self::None) first.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 15] = [
         Self::None,
         Self::CoverageMap,
         Self::TypeMap,
@@ -73,6 +91,9 @@ impl CloudDebugView {
         Self::Transmittance,
         Self::CloudDepth,
         Self::SingleFrame,
+        Self::StepCount,
+        Self::SampleCount,
+        Self::ReadCount,
     ];
 
     /// Its name in snake_case, such as `coverage_map`.
@@ -85,7 +106,7 @@ impl CloudDebugView {
         Self::ALL.into_iter().find(|view| view.name() == name)
     }
 
-    /// The mode in `debug.wesl`; 0 where the normal shader does.
+    /// The mode in `debug.wesl` or `count.wesl`; 0 where the normal shader does.
     pub(crate) fn shader_mode(self) -> u32 {
         match self {
             Self::CoverageMap => 1,
@@ -95,6 +116,9 @@ impl CloudDebugView {
             Self::Steps => 5,
             Self::Transmittance => 6,
             Self::CloudDepth => 7,
+            Self::StepCount => 8,
+            Self::SampleCount => 9,
+            Self::ReadCount => 10,
             Self::None | Self::SingleScattering | Self::MultipleScattering | Self::NoPhase | Self::SingleFrame => 0,
         }
     }
@@ -103,6 +127,7 @@ impl CloudDebugView {
     pub(crate) fn shader(self) -> DebugShader {
         match self {
             Self::CoverageMap | Self::TypeMap => DebugShader::Map,
+            Self::StepCount | Self::SampleCount | Self::ReadCount => DebugShader::Count,
             _ if self.shader_mode() > 0 => DebugShader::March,
             _ => DebugShader::None,
         }
@@ -125,7 +150,7 @@ impl CloudDebugView {
             Self::MultipleScattering => lighting.ambient_strength = 0.0,
             Self::NoPhase => lighting.phase = PhaseFunction::Isotropic,
             // Air in front of a value would change it.
-            _ if self.shader_mode() > 0 => lighting.aerial_perspective = 0.0,
+            _ if self.shader().shows_values() => lighting.aerial_perspective = 0.0,
             _ => {}
         }
     }

@@ -4,25 +4,28 @@ use std::{
     collections::hash_map::DefaultHasher,
     fs::{self, File},
     hash::{Hash as _, Hasher as _},
-    io::{BufRead as _, BufReader},
+    io::{BufRead as _, BufReader, Write as _},
     path::{Path, PathBuf},
     process::{Child, Command, Stdio},
-    sync::mpsc::{RecvTimeoutError, channel},
+    slice,
+    sync::mpsc::{Receiver, RecvTimeoutError, channel},
     thread,
     time::{Duration, Instant},
 };
 
-use anyhow::{Context as _, Result, anyhow, bail, ensure};
+use anyhow::{Context as _, Error, Result, anyhow, bail, ensure};
 use serde_json::Value;
 
 use crate::{picture::Picture, progress::Progress};
 
 /// Passes whose time is the clouds' cost. Writing `CloudBuffer` is not one: only measuring asks for it.
-const PASSES: [&str; 4] = ["cloud_sky", "cloud_march", "cloud_accumulate", "cloud_composite"];
+pub const PASSES: [&str; 4] = ["cloud_sky", "cloud_march", "cloud_accumulate", "cloud_composite"];
 
 /// Where the renderer is, and where its files go.
 pub struct Engine {
     pub headless: PathBuf,
+    /// The folder whose `assets` it reads, if not the one that the environment names.
+    pub assets: Option<PathBuf>,
     pub out: PathBuf,
     /// The scenes' fields of view are divided by this.
     pub zoom: f64,
@@ -64,9 +67,18 @@ impl Cost {
 }
 
 impl Engine {
+    fn command(&self, headless: &Path) -> Command {
+        let mut command = Command::new(headless);
+        if let Some(assets) = &self.assets {
+            command.env("BEVY_ASSET_ROOT", assets);
+        }
+        command
+    }
+
     /// Every setting that these options amount to, without rendering.
     pub fn effective(&self, options: &str) -> Result<Value> {
-        let output = Command::new(&self.headless)
+        let output = self
+            .command(&self.headless)
             .arg("--effective")
             .args(options.split_whitespace())
             .output()
@@ -113,10 +125,15 @@ impl Engine {
         jobs: &[Job],
         progress: &Progress,
     ) -> Result<()> {
-        let folder = self.folder(scene);
+        let options = format!("--scene {scene} --size {size} {} {shared}", self.view(scene)?);
+        self.render_in(scene, &options, jobs, progress)
+    }
+
+    /// Renders jobs that have these options in common into a folder of this name.
+    pub fn render_in(&self, name: &str, common: &str, jobs: &[Job], progress: &Progress) -> Result<()> {
+        let folder = self.folder(name);
         fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
-        let view = format!("{} {shared}", self.view(scene)?);
-        let stamps: Vec<String> = jobs.iter().map(|job| self.stamp(job, size, &view)).collect::<Result<_>>()?;
+        let stamps: Vec<String> = jobs.iter().map(|job| self.stamp(job, common)).collect::<Result<_>>()?;
         let is_done = |(job, stamp): &(&Job, &String)| {
             fs::read_to_string(done_path(&folder, job)).is_ok_and(|found| found == **stamp)
         };
@@ -125,8 +142,24 @@ impl Engine {
         if left.is_empty() {
             return Ok(());
         }
+        let left_jobs: Vec<&Job> = left.iter().map(|(job, _)| *job).collect();
+        let mut child = self.spawn(&folder, common, &left_jobs, false)?;
+        // One line for each job that is done.
+        let mut left = left.into_iter();
+        self.each_line(&mut child, || {
+            let Some((job, stamp)) = left.next() else { return Ok(()) };
+            fs::write(done_path(&folder, job), stamp)
+                .with_context(|| format!("cannot write to {}", folder.display()))?;
+            progress.done(&format!("{name}: {}", job.name));
+            Ok(())
+        })?;
+        if !child.wait().context("headless")?.success() { Err(failed(&folder)) } else { Ok(()) }
+    }
+
+    /// Starts a batch; a `paced` one begins each picture when a line comes in.
+    fn spawn(&self, folder: &Path, common: &str, jobs: &[&Job], paced: bool) -> Result<Child> {
         let mut lines = String::new();
-        for (Job { name, options, frames, picture }, _) in &left {
+        for Job { name, options, frames, picture } in jobs {
             lines += &format!("{options} --frames {frames} --timings {name}.json");
             lines += &if *picture { format!(" --out {name}.png --cloud {name}.exr\n") } else { "\n".to_owned() };
         }
@@ -134,40 +167,44 @@ impl Engine {
         fs::write(&batch, lines).with_context(|| format!("cannot write {}", batch.display()))?;
         let log_path = folder.join("headless.log");
         let log = File::create(&log_path).with_context(|| format!("cannot write {}", log_path.display()))?;
-        let mut child = Command::new(fs::canonicalize(&self.headless)?)
-            .current_dir(&folder)
-            .args(["--scene", scene, "--size", size, "--batch", "batch.txt"])
-            .args(view.split_whitespace())
-            .stdin(Stdio::null())
+        self.command(&fs::canonicalize(&self.headless)?)
+            .current_dir(folder)
+            .args(["--batch", "batch.txt"])
+            .args(paced.then_some("--paced"))
+            .args(common.split_whitespace())
+            .stdin(if paced { Stdio::piped() } else { Stdio::null() })
             .stdout(Stdio::piped())
             .stderr(log)
             .spawn()
-            .with_context(|| format!("cannot start {}", self.headless.display()))?;
-        // One line for each job that is done.
-        let mut left = left.into_iter();
-        self.each_line(&mut child, || {
-            let Some((job, stamp)) = left.next() else { return Ok(()) };
-            fs::write(done_path(&folder, job), stamp)
-                .with_context(|| format!("cannot write to {}", folder.display()))?;
-            progress.done(&format!("{scene}: {}", job.name));
-            Ok(())
-        })?;
-        if !child.wait().context("headless")?.success() {
-            let log = fs::read_to_string(&log_path).unwrap_or_default();
-            let tail: Vec<&str> = log.lines().rev().take(5).collect();
-            bail!("headless failed in {}: {}", batch.display(), tail.into_iter().rev().collect::<Vec<_>>().join(" / "));
+            .with_context(|| format!("cannot start {}", self.headless.display()))
+    }
+
+    /// Whether an earlier run has done all of these jobs.
+    pub fn is_done(&self, name: &str, common: &str, jobs: &[Job]) -> Result<bool> {
+        let folder = self.folder(name);
+        for job in jobs {
+            let stamp = self.stamp(job, common)?;
+            if !fs::read_to_string(done_path(&folder, job)).is_ok_and(|found| found == stamp) {
+                return Ok(false);
+            }
         }
-        Ok(())
+        Ok(true)
+    }
+
+    /// Starts jobs of which each waits for its turn.
+    pub fn start<'a>(&'a self, name: &str, common: &'a str, jobs: &'a [Job]) -> Result<Paced<'a>> {
+        let folder = self.folder(name);
+        fs::create_dir_all(&folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        let mut child = self.spawn(&folder, common, &jobs.iter().collect::<Vec<_>>(), true)?;
+        let lines = lines_of(&mut child)?;
+        Ok(Paced { engine: self, folder, common, left: jobs.iter(), child, lines })
     }
 
     /// Calls `take` at each line that the child prints; ends it where the time is up.
     fn each_line(&self, child: &mut Child, mut take: impl FnMut() -> Result<()>) -> Result<()> {
-        let stdout = child.stdout.take().ok_or_else(|| anyhow!("headless has no stdout"))?;
-        let (sender, lines) = channel();
-        thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|l| sender.send(l)));
+        let lines = lines_of(child)?;
         loop {
-            let left = self.deadline.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()));
-            match lines.recv_timeout(left) {
+            match lines.recv_timeout(self.time_left()) {
                 Ok(_) => take()?,
                 Err(RecvTimeoutError::Disconnected) => return Ok(()),
                 Err(RecvTimeoutError::Timeout) => {
@@ -178,12 +215,16 @@ impl Engine {
         }
     }
 
+    fn time_left(&self) -> Duration {
+        self.deadline.map_or(Duration::MAX, |end| end.saturating_duration_since(Instant::now()))
+    }
+
     /// What a job's files follow from: they are those of another run only where all of it is the same.
-    fn stamp(&self, job: &Job, size: &str, view: &str) -> Result<String> {
+    fn stamp(&self, job: &Job, common: &str) -> Result<String> {
         let built = fs::metadata(&self.headless)?;
         let mut hasher = DefaultHasher::new();
         (built.len(), built.modified().ok(), job.frames, job.picture).hash(&mut hasher);
-        Ok(format!("{:016x} {size} {view} {}", hasher.finish(), job.options))
+        Ok(format!("{:016x} {common} {}", hasher.finish(), job.options))
     }
 
     /// The picture that a job made.
@@ -193,8 +234,85 @@ impl Engine {
 
     /// What a job took.
     pub fn cost(&self, scene: &str, job: &str) -> Result<Cost> {
-        read_cost(&self.folder(scene).join(job).with_extension("json"))
+        let path = self.folder(scene).join(job).with_extension("json");
+        let timings = read_json(&path)?;
+        let software = is_software(timings["adapter"].as_str().unwrap_or_default());
+        Ok(cost_of(&timings, &PASSES, if software { "min" } else { "median" }))
     }
+
+    /// The name of the preset whose quality this one has, such as `high`; the default quality's, where none is given.
+    pub fn quality_preset(&self, quality: Option<&Value>) -> Result<Option<&'static str>> {
+        let own = match quality {
+            Some(quality) => quality.clone(),
+            None => self.effective("")?["quality"].take(),
+        };
+        for name in QUALITIES {
+            if self.effective(&format!("--quality {name}"))?["quality"] == own {
+                return Ok(Some(name));
+            }
+        }
+        Ok(None)
+    }
+}
+
+/// The presets that march, in the order of their cost.
+pub const QUALITIES: [&str; 4] = ["low", "medium", "high", "ultra"];
+
+/// A name as a heading has it: `High` of `high`.
+pub fn title(name: &str) -> String {
+    let mut letters = name.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
+}
+
+/// A renderer that waits for its turn before each picture.
+pub struct Paced<'a> {
+    engine: &'a Engine,
+    folder: PathBuf,
+    common: &'a str,
+    left: slice::Iter<'a, Job>,
+    child: Child,
+    lines: Receiver<String>,
+}
+
+impl Paced<'_> {
+    /// Renders the next job, and waits until it is done.
+    pub fn take_turn(&mut self) -> Result<()> {
+        let job = self.left.next().context("there is no job left")?;
+        let stdin = self.child.stdin.as_mut().context("headless has no stdin")?;
+        // One that has ended takes no line; its log says why.
+        let asked = stdin.write_all(b"\n").and_then(|()| stdin.flush());
+        match self.lines.recv_timeout(self.engine.time_left()) {
+            Ok(_) if asked.is_ok() => {
+                let stamp = self.engine.stamp(job, self.common)?;
+                fs::write(done_path(&self.folder, job), stamp)
+                    .with_context(|| format!("cannot write to {}", self.folder.display()))
+            }
+            Err(RecvTimeoutError::Timeout) => bail!("the time is up (--minutes); the same command goes on from here"),
+            _ => Err(failed(&self.folder)),
+        }
+    }
+}
+
+impl Drop for Paced<'_> {
+    /// Ends it: after its last job nothing is lost, and before that nobody waits for it.
+    fn drop(&mut self) {
+        let _ = self.child.kill().and_then(|()| self.child.wait());
+    }
+}
+
+/// The lines that a child prints, as they come.
+fn lines_of(child: &mut Child) -> Result<Receiver<String>> {
+    let stdout = child.stdout.take().ok_or_else(|| anyhow!("headless has no stdout"))?;
+    let (sender, lines) = channel();
+    thread::spawn(move || BufReader::new(stdout).lines().map_while(Result::ok).try_for_each(|l| sender.send(l)));
+    Ok(lines)
+}
+
+/// What a renderer's log says last.
+fn failed(folder: &Path) -> Error {
+    let log = fs::read_to_string(folder.join("headless.log")).unwrap_or_default();
+    let tail: Vec<&str> = log.lines().rev().take(5).collect();
+    anyhow!("headless failed in {}: {}", folder.display(), tail.into_iter().rev().collect::<Vec<_>>().join(" / "))
 }
 
 /// Frames after which a picture of this quality no longer changes but for noise; four at least, for the median of their
@@ -217,18 +335,21 @@ fn done_path(folder: &Path, job: &Job) -> PathBuf {
     folder.join(&job.name).with_extension("done")
 }
 
-fn read_cost(path: &Path) -> Result<Cost> {
+/// A file that `headless` wrote.
+pub fn read_json(path: &Path) -> Result<Value> {
     let text = fs::read_to_string(path).with_context(|| format!("cannot read {}", path.display()))?;
-    let all: Value = serde_json::from_str(&text).with_context(|| path.display().to_string())?;
-    let adapter = all["adapter"].as_str().unwrap_or("unknown").to_owned();
-    let which = if is_software(&adapter) { "min" } else { "median" };
-    let time = |name: &'static str| Some((name, all["passes"][name][which].as_f64()?));
-    let passes: Vec<_> = PASSES.into_iter().filter_map(time).collect();
-    Ok(Cost {
+    serde_json::from_str(&text).with_context(|| path.display().to_string())
+}
+
+/// GPU time of these passes in a timings file: the frames' `min` or `median`.
+pub fn cost_of(timings: &Value, names: &[&'static str], which: &str) -> Cost {
+    let time = |name: &&'static str| Some((*name, timings["passes"][*name][which].as_f64()?));
+    let passes: Vec<_> = names.iter().filter_map(time).collect();
+    Cost {
         // One missing makes the sum meaningless.
-        passes: if passes.len() == PASSES.len() { passes } else { Vec::new() },
-        adapter,
-    })
+        passes: if passes.len() == names.len() { passes } else { Vec::new() },
+        adapter: timings["adapter"].as_str().unwrap_or("unknown").to_owned(),
+    }
 }
 
 /// Whether a driver runs on the processor. It then shares it with whatever else runs, which only ever adds time: the
@@ -264,6 +385,15 @@ mod tests {
         let found = [("Off", "Two"), ("SlidingWindow", "Two"), ("Upscale", "Two"), ("Upscale", "Four")];
         assert_eq!(found.map(|(temporal, block)| of(temporal, block)), [4, 8, 32, 128]);
         assert_eq!(of("Exponential", "Two"), 60);
+    }
+
+    #[test]
+    fn a_cost_is_whole_or_none() {
+        let timings = serde_json::json!({ "adapter": "a GPU", "passes": {
+            "cloud_march": { "min": 1.0, "median": 2.0 }, "cloud_sky": { "min": 0.5, "median": 0.5 }, "cloud_depth": null } });
+        let cost = cost_of(&timings, &["cloud_march", "cloud_sky"], "median");
+        assert_eq!((cost.total(), cost.march(), cost.adapter.as_str()), (Some(2.5), Some(2.0), "a GPU"));
+        assert_eq!(cost_of(&timings, &["cloud_march", "cloud_depth"], "min").total(), None);
     }
 
     #[test]

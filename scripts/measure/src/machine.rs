@@ -1,8 +1,11 @@
 //! What a table was measured on.
 
-use std::process::Command;
+use std::{path::Path, process::Command};
 
 use crate::engine::is_software;
+
+/// What a report's figures follow from.
+const MEASURED: [&str; 6] = ["src", "examples", "assets", "scripts", "Cargo.toml", "Cargo.lock"];
 
 /// Lines for the head of a report.
 pub struct Machine {
@@ -15,18 +18,18 @@ pub struct Machine {
 }
 
 impl Machine {
-    pub fn this(adapter: &str) -> Self {
+    pub fn this(adapter: &str, repository: &Path) -> Self {
         let cpu = std::fs::read_to_string("/proc/cpuinfo").ok().and_then(|text| {
             let line = text.lines().find(|line| line.starts_with("model name"))?;
             Some(line.split_once(':')?.1.trim().to_owned())
         });
         let cpu = cpu.or_else(|| said("sysctl", &["-n", "machdep.cpu.brand_string"]));
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
-        let dirty = if said("git", &["status", "--porcelain", "--untracked-files=no"]).is_some() {
-            " with changes"
-        } else {
-            ""
-        };
+        let folder = repository.display().to_string();
+        let git = |arguments: &[&str]| said("git", &[&["-C", &folder], arguments].concat());
+        // Reports that were just written are no change of what is measured.
+        let changed = git(&[&["status", "--porcelain", "--untracked-files=no", "--"], &MEASURED[..]].concat());
+        let dirty = if changed.is_some() { " **with changes that are in no commit**" } else { "" };
         let load = std::fs::read_to_string("/proc/loadavg").ok();
         let load = load.and_then(|text| text.split_whitespace().nth(2)?.parse().ok());
         Self {
@@ -34,7 +37,7 @@ impl Machine {
             adapter: adapter.to_owned(),
             processor: format!("{} ({cores} threads)", cpu.unwrap_or_else(|| "unknown processor".to_owned())),
             date: said("date", &["-u", "+%Y-%m-%d %H:%M UTC"]).unwrap_or_else(|| "unknown date".to_owned()),
-            commit: said("git", &["rev-parse", "--short", "HEAD"])
+            commit: git(&["rev-parse", "--short", "HEAD"])
                 .map_or_else(|| "unknown commit".to_owned(), |commit| commit + dirty),
         }
     }
@@ -46,18 +49,33 @@ impl Machine {
         if !is_software(&self.adapter) {
             return "Times are medians of the frames.".to_owned();
         }
+        format!(
+            "This is a software driver, which shares the processor with whatever else runs: times are those of the quickest \
+             frame, and say little about a GPU; ratios say more.{}",
+            self.about_load()
+        )
+    }
+
+    /// The same where times are medians on any driver, and ratios those of pairs.
+    pub fn about_medians(&self) -> String {
+        if !is_software(&self.adapter) {
+            return String::new();
+        }
+        format!(
+            "This is a software driver: times say little about a GPU, ratios more, and counts are the same on both.{}",
+            self.about_load()
+        )
+    }
+
+    fn about_load(&self) -> String {
         let cores = std::thread::available_parallelism().map_or(1, std::num::NonZero::get) as f64;
-        let busy = match self.load {
+        match self.load {
             // What we run ourselves keeps every core busy.
             Some(load) if load > 1.5 * cores => {
                 format!(" **Other work ran beside it (load {load:.1} on {cores} cores): costs are rough.**")
             }
             _ => String::new(),
-        };
-        format!(
-            "This is a software driver, which shares the processor with whatever else runs: times are those of the quickest \
-             frame, and say little about a GPU; ratios say more.{busy}"
-        )
+        }
     }
 }
 

@@ -1,12 +1,15 @@
 //! Judges bevy_cumulus: what each approximation costs in truth and in time.
 //!
 //! `fidelity`, `ladder` and `motion` drive the `headless` example (`engine`), compare its pictures (`metrics`) with references
-//! (`truth`) and write tables and plots. `scripts/fidelity`, `scripts/ladder` and
-//! `scripts/motion` build and start it.
+//! (`truth`) and write tables and plots; `baseline` and `frozen` drive that of commit eba2f38 beside it. `scripts/report` builds
+//! and starts all of them.
 
 mod backdrop;
+mod baseline;
 mod engine;
 mod fidelity;
+mod frozen;
+mod label;
 mod ladder;
 mod machine;
 mod markdown;
@@ -21,17 +24,18 @@ mod taken;
 mod truth;
 
 use std::{
+    fs,
     path::PathBuf,
     process::ExitCode,
     time::{Duration, Instant},
 };
 
-use anyhow::{Result, anyhow, bail};
+use anyhow::{Context as _, Result, anyhow, bail};
 use clap::{Args, Parser, Subcommand};
 
 use crate::{engine::Engine, metrics::Truth, picture::Picture, truth::Recipe};
 
-/// Measures bevy_cumulus. Usually started by scripts/fidelity or scripts/ladder.
+/// Measures bevy_cumulus. Usually started by scripts/report.
 #[derive(Parser)]
 #[command(name = "measure")]
 struct Options {
@@ -41,12 +45,16 @@ struct Options {
 
 #[derive(Subcommand)]
 enum What {
-    /// Errors and costs of presets and of single approximations: FIDELITY.md
+    /// Errors and costs of presets and of single approximations
     Fidelity(fidelity::Options),
-    /// The thesis's ladder of optimisations, and cost studies: LADDER.md
+    /// The thesis's ladder of optimisations, and cost studies
     Ladder(ladder::Options),
-    /// Each temporal mode in motion: MOTION.md
+    /// Each temporal mode in motion
     Motion(motion::Options),
+    /// Costs and counts beside those of commit eba2f38
+    Baseline(baseline::Options),
+    /// Whether the presets of commit eba2f38 look as they did
+    Frozen(frozen::Options),
     /// Errors of one picture against another; both are STEM.png and STEM.exr
     Compare { truth: PathBuf, test: PathBuf },
 }
@@ -80,7 +88,7 @@ struct Common {
     /// Where pictures and results go
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
-    /// The report [default: FIDELITY.md or LADDER.md; of a part or with a stand-in, the same in the output folder]
+    /// The report [default: docs/reports/NAME.md; of a part or with a stand-in, NAME.md in the output folder]
     #[arg(long, value_name = "FILE.md")]
     report: Option<PathBuf>,
     /// Where reference pictures are kept from run to run [default: target/references]
@@ -125,7 +133,8 @@ impl Common {
         let limit = self.minutes.map(|minutes| Duration::try_from_secs_f64(60.0 * minutes));
         let limit = limit.transpose().map_err(|error| anyhow!("--minutes: {error}"))?;
         let deadline = limit.and_then(|limit| Instant::now().checked_add(limit));
-        Ok(Engine { headless: self.headless.clone(), out, zoom, deadline })
+        fs::create_dir_all(&out).with_context(|| format!("cannot make {}", out.display()))?;
+        Ok(Engine { headless: self.headless.clone(), assets: None, out, zoom, deadline })
     }
 
     fn recipe(&self, small: u32, full: u32) -> Result<Recipe> {
@@ -142,9 +151,10 @@ impl Common {
     }
 
     /// Where the report goes: into the repository only where it is whole and true.
-    fn report(&self, engine: &Engine, name: &str, whole: bool) -> PathBuf {
-        let folder = if whole { &self.repository } else { &engine.out };
-        self.report.clone().unwrap_or_else(|| folder.join(name))
+    fn report(&self, engine: &Engine, name: &str, whole: bool) -> Result<PathBuf> {
+        let folder = if whole { &self.repository.join("docs/reports") } else { &engine.out };
+        fs::create_dir_all(folder).with_context(|| format!("cannot make {}", folder.display()))?;
+        Ok(self.report.clone().unwrap_or_else(|| folder.join(name).with_extension("md")))
     }
 }
 
@@ -153,6 +163,8 @@ fn main() -> ExitCode {
         What::Fidelity(options) => fidelity::run(&options),
         What::Ladder(options) => ladder::run(&options),
         What::Motion(options) => motion::run(&options),
+        What::Baseline(options) => baseline::run(&options),
+        What::Frozen(options) => frozen::run(&options),
         What::Compare { truth, test } => compare(&truth, &test),
     };
     match result {

@@ -7,7 +7,7 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use anyhow::{Context as _, Result, anyhow};
+use anyhow::{Context as _, Result, anyhow, ensure};
 use serde_json::Value;
 
 use crate::{
@@ -146,7 +146,10 @@ impl Recipe {
         (settings.to_string(), &self.quality, self.samples, &self.halves).hash(&mut hasher);
         let sources: &[&str] = if self.is_stand_in() { &ALL_SOURCES } else { &SOURCES };
         for source in sources.iter().chain([&SCENES]) {
-            hash_files(&self.repository.join(source), &mut hasher)?;
+            let path = self.repository.join(source);
+            // One that was moved would no longer be hashed, and an old picture taken for the truth.
+            ensure!(path.exists(), "there is no {}, which references follow from (truth.rs lists it)", path.display());
+            hash_files(&path, &mut hasher)?;
         }
         Ok(hasher.finish())
     }

@@ -109,7 +109,7 @@ fn list_prints_scenes_presets_and_paths_one_a_line() {
     assert!(output.status.success());
     let text = String::from_utf8(output.stdout).expect("the list is text");
     let lines: BTreeSet<&str> = text.lines().collect();
-    let everyday = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills"];
+    let everyday = ["ground_noon", "ground_backlit", "overcast", "sunset", "hills", "broken", "storm"];
     let viewpoints = ["inside", "above", "between", "orbit", "limb", "hills_in_cloud", "split_screen"];
     let scenes = everyday.into_iter().chain(viewpoints).chain(FIGURES).map(str::to_owned);
     let paths = CloudSettings::default().paths();

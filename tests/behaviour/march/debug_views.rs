@@ -63,7 +63,7 @@ fn every_view_is_finite_and_its_own_and_none_is_as_before() {
             }
             seen.push((debug, pixels));
         }
-        assert_eq!(marches(&app), 3, "one march for clouds, one for stages, one for maps");
+        assert_eq!(marches(&app), 4, "one march for clouds, one for stages, one for maps, one that counts");
         show(&mut app, &view, CloudDebugView::None);
         // Sixteen bits a frame and another phase of the window: nearly the same.
         let after = cloud_pixels(&app, &view);

@@ -1,5 +1,6 @@
 //! The ray march against closed forms, and what its steps cost.
 
+mod counts;
 mod debug_views;
 mod empty_space;
 mod slab;

@@ -81,14 +81,17 @@ struct Results {
 
 pub fn run(options: &Options) -> Result<()> {
     if options.list {
-        rows::all().iter().for_each(|row| println!("{:16} {}", row.name, row.label));
+        let mut rows = rows::all();
+        rows::label(&mut rows, &options.common.engine("fidelity")?)?;
+        rows.iter().for_each(|row| println!("{:16} {}", row.name, row.label));
         return Ok(());
     }
     let common = &options.common;
     let engine = common.engine("fidelity")?;
     let recipe = common.recipe(SAMPLES, FULL_SAMPLES)?;
     let size = common.size(SMALL_SIZE);
-    let rows = rows::chosen(&options.only);
+    let mut rows = rows::chosen(&options.only);
+    rows::label(&mut rows, &engine)?;
     let usual = &SCENES[..if common.full { SCENES.len() } else { FEW_SCENES }];
     let scenes: Vec<String> = if options.scenes.is_empty() {
         usual.iter().map(|scene| (*scene).to_owned()).collect()
@@ -107,7 +110,7 @@ pub fn run(options: &Options) -> Result<()> {
     }
     let adapter = results.first().and_then(|r| r.found.first()).map(|f| f.cost.adapter.clone()).unwrap_or_default();
     let whole = options.scenes.is_empty() && options.only.is_empty() && !recipe.is_stand_in();
-    let taken = recipe.taken(size, engine.zoom, Machine::this(&adapter), progress.seconds());
+    let taken = recipe.taken(size, engine.zoom, Machine::this(&adapter, &common.repository), progress.seconds());
     let results = Results { taken, rows, scenes: results };
     drop(progress);
     if !common.keep {
@@ -116,7 +119,7 @@ pub fn run(options: &Options) -> Result<()> {
     let json_path = engine.out.join("fidelity.json");
     fs::write(&json_path, serde_json::to_string_pretty(&results.to_json())?)
         .with_context(|| format!("cannot write {}", json_path.display()))?;
-    let path = common.report(&engine, "FIDELITY.md", whole);
+    let path = common.report(&engine, "fidelity", whole)?;
     fs::write(&path, report::write(&results)).with_context(|| format!("cannot write {}", path.display()))?;
     println!("{}\n{}\n{}", path.display(), json_path.display(), engine.out.join("SCENE.png").display());
     Ok(())

@@ -1,4 +1,4 @@
-//! FIDELITY.md.
+//! The report on fidelity.
 
 use std::fmt::Write as _;
 
@@ -9,7 +9,7 @@ use crate::{
     smooth::RADIUS,
 };
 
-/// What the default preset is to reach, and where (issue 4).
+/// What High is to reach, and where (issue 4).
 const FLIP_TARGET: f64 = 0.06;
 const LUMINANCE_TARGET: f64 = 0.05;
 const TARGET_SCENES: [&str; 4] = ["ground_noon", "ground_backlit", "overcast", "sunset"];
@@ -18,11 +18,9 @@ const HEAD: &str = "# What each approximation costs in truth and in time
 
 A real-time cloud is a stack of approximations. Here each preset, and each approximation alone, is held against a path
 tracer that makes none of them (`CloudQuality::reference()`), and against our own march with steps so short that only the
-model of light is left to differ. Written by `scripts/fidelity`; edit that, not this file.
+model of light is left to differ. Written by `scripts/report fidelity`; edit that, not this file.
+[lab-notes.md](../lab-notes.md) says what was tried because of such tables.
 ";
-
-/// What was changed because of these tables, kept by hand.
-const HISTORY: &str = include_str!("history.md");
 
 const COLUMNS: &str = "## How to read the tables
 
@@ -43,7 +41,7 @@ and B of independent samples: `(x − A)(x − B)` has the mean `(x − truth)²
 and T error on average (a small one may come out slightly negative).
 
 FLIP compares pictures as shown, and tone mapping bends: a noisy picture is shown too dark, in the colour of its most frequent
-samples. For FLIP the halves are therefore averaged as light, before tone mapping, and over some 50 pixels: what their light is
+samples. For FLIP the halves are therefore averaged as light, before tone mapping, and over several pixels: what their light is
 as a share of our converged march's, and what their transmittance differs by per opacity, is averaged over a Gaussian of
 RADIUS pixels, and the march is changed by it. What march and reference differ in within a few pixels is thus not in FLIP, but in
 relMSE and T error, which go by the halves as they are.
@@ -74,16 +72,15 @@ pub fn write(results: &Results) -> String {
     for scene in 0..results.scenes.len() {
         text += &one_scene(results, scene);
     }
-    text += "\n";
-    text += HISTORY;
     text += &settings(results);
     text
 }
 
 fn targets(results: &Results) -> String {
-    let mut text = "\n## Targets\n\nThe default preset, High, against the reference:\n\n".to_owned();
-    let mut rows = Vec::new();
     let high = results.row(HIGH);
+    let label = high.map_or(HIGH, |row| &results.rows[row].label);
+    let mut text = format!("\n## Targets\n\n{label} against the reference:\n\n");
+    let mut rows = Vec::new();
     for scene in results.scenes.iter().filter(|s| TARGET_SCENES.contains(&s.scene.as_str())) {
         let Some(found) = high.and_then(|row| scene.found.get(row)) else { continue };
         let verdict = |good: bool| if good { "pass" } else { "**fail**" };
@@ -135,7 +132,7 @@ fn presets(results: &Results) -> String {
     let rows: Vec<_> = of_group(results, &[Group::Preset, Group::Converged, Group::FromHigh])
         .into_iter()
         .map(|i| {
-            let mut cells = vec![results.rows[i].label.to_owned()];
+            let mut cells = vec![results.rows[i].label.clone()];
             cells.extend(columns(mean(results, i, |f| f.to_truth)));
             cells.extend([maybe(results.ratio(i))]);
             cells
@@ -183,16 +180,10 @@ fn front(results: &Results) -> String {
             let better: Vec<&str> = all
                 .iter()
                 .filter(|(other, at)| *other != i && at.dominates(&place))
-                .map(|(other, _)| results.rows[*other].label)
+                .map(|(other, _)| results.rows[*other].label.as_str())
                 .collect();
             let verdict = if better.is_empty() { "on the front".to_owned() } else { better.join("; ") };
-            vec![
-                results.rows[i].label.to_owned(),
-                number(place.cost),
-                number(place.flip),
-                number(place.rel_mse),
-                verdict,
-            ]
+            vec![results.rows[i].label.clone(), number(place.cost), number(place.flip), number(place.rel_mse), verdict]
         })
         .collect();
     format!(
@@ -209,7 +200,7 @@ fn passes(results: &Results) -> String {
     for i in of_group(results, &[Group::Preset, Group::Converged]) {
         for scene in &results.scenes {
             let Some(found) = scene.found.get(i) else { continue };
-            let mut cells = vec![results.rows[i].label.to_owned(), scene.scene.clone()];
+            let mut cells = vec![results.rows[i].label.clone(), scene.scene.clone()];
             cells.extend(found.cost.passes.iter().map(|(_, ms)| number(*ms)));
             cells.push(maybe(found.cost.total()));
             rows.push(cells);
@@ -227,7 +218,7 @@ fn alone(results: &Results) -> String {
             let to_truth = mean(results, i, |f| f.to_truth);
             let get = |errors: Option<Errors>, of: fn(&Errors) -> f64| maybe(errors.as_ref().map(of));
             vec![
-                results.rows[i].label.to_owned(),
+                results.rows[i].label.clone(),
                 get(to_converged, |e| e.flip),
                 get(to_converged, |e| e.rel_mse),
                 get(to_converged, |e| e.luminance),
@@ -262,8 +253,7 @@ fn one_scene(results: &Results, scene: usize) -> String {
     let scene = &results.scenes[scene];
     let mut rows = Vec::new();
     for (row, found) in results.rows.iter().zip(&scene.found) {
-        let mut cells =
-            vec![if row.group == Group::Alone { format!("… {}", row.label) } else { row.label.to_owned() }];
+        let mut cells = vec![if row.group == Group::Alone { format!("… {}", row.label) } else { row.label.clone() }];
         cells.extend(columns(Some(found.to_truth)));
         let near = found.to_converged;
         cells.extend([near.flip, near.rel_mse, near.luminance].map(number));

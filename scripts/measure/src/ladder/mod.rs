@@ -14,6 +14,7 @@ use crate::{
     backdrop::Backdrop,
     engine::{Cost, Engine, Job, is_software, median},
     fidelity,
+    label::fill,
     machine::Machine,
     metrics::{Errors, Truth},
     picture::Picture,
@@ -95,10 +96,10 @@ pub fn run(options: &Options) -> Result<()> {
 
     // The first of what was measured tells the device.
     let any_job = if wanted(LADDER) { job_name(0, 0) } else { format!("{}_0_0", options.only[0]) };
-    let machine = Machine::this(&engine.cost(SCENE, &any_job)?.adapter);
+    let machine = Machine::this(&engine.cost(SCENE, &any_job)?.adapter, &common.repository);
     let whole = options.only.is_empty() && !recipe.is_stand_in();
-    let report_path = common.report(&engine, "LADDER.md", whole);
-    let pictures = if whole { "docs/pictures/ladder" } else { "plots" };
+    let report_path = common.report(&engine, "ladder", whole)?;
+    let pictures = if whole { "../pictures/ladder" } else { "plots" };
     let plots = report_path.parent().unwrap_or(&engine.out).join(pictures);
     let results = Results {
         taken: recipe.taken(size, engine.zoom, machine, progress.seconds()),
@@ -138,6 +139,9 @@ fn job_name(rung: usize, round: usize) -> String {
 fn climb(engine: &Engine, size: &str, truth: &Truth, progress: &Progress) -> Result<Vec<Step>> {
     let mut all: Vec<(&rungs::Rung, String)> = RUNGS.iter().enumerate().map(|(n, r)| (r, rungs::options(n))).collect();
     all.push((&HIGH, format!("--quality high {DISTANCE}")));
+    for n in 0..RUNGS.len() {
+        rungs::check_pinned(n, &engine.effective(&rungs::options(n))?["quality"])?;
+    }
     let mut jobs = Vec::new();
     for round in 0..ROUNDS {
         for (n, (_, options)) in all.iter().enumerate() {
@@ -165,7 +169,7 @@ fn climb(engine: &Engine, size: &str, truth: &Truth, progress: &Progress) -> Res
         let (to_first, map) = first.judge(&picture)?;
         sheet_rows.push(vec![first.picture().shown.clone(), picture.shown.clone(), map.magma]);
         steps.push(Step {
-            label: rung.label.to_owned(),
+            label: fill(rung.label, &engine.effective(options)?)?,
             options: options.clone(),
             thesis: rung.thesis,
             march: typical(&costs, Cost::march),

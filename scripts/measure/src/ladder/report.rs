@@ -1,10 +1,13 @@
-//! LADDER.md and its plots.
+//! The report on the ladder, and its plots.
 
 use std::path::Path;
 
 use anyhow::Result;
 
-use super::{Results, Step, studies::Study};
+use super::{
+    Results, Step,
+    studies::{LIGHT_REACH, Study, THICKNESS},
+};
 use crate::{
     markdown::{maybe, number, table},
     plot::{Plot, Series},
@@ -14,7 +17,8 @@ const HEAD: &str = "# What each optimisation gains and costs
 
 Ford's thesis (chapter 5.4) adds one optimisation after another to its renderer and reports the time of a frame. Here the same
 ladder is climbed on our own switches, and the error of each rung is measured, which the thesis judges by eye. Below it stand
-the studies of Costa's dissertation (chapter 4.1). Written by `scripts/ladder`; edit that, not this file.
+the studies of Costa's dissertation (chapter 4.1). Written by `scripts/report ladder`; edit that, not this file.
+[lab-notes.md](../lab-notes.md) says why our ratios differ from the thesis's.
 ";
 
 const COLUMNS: &str = "
@@ -24,34 +28,11 @@ const COLUMNS: &str = "
 | all passes | the same with sky light, accumulation and composite |
 | faster | march of the rung before over this one's: how many times faster |
 | thesis, faster | the same in the thesis, from its times: 1920×1080, RTX 4060 laptop, its own clouds and view |
-| FLIP to first, relMSE, luminance | error against the first rung: what the optimisations together have changed. Terms as in FIDELITY.md |
+| FLIP to first, relMSE, luminance | error against the first rung: what the optimisations together have changed. Terms as in [fidelity.md](fidelity.md) |
 | FLIP to reference | error against the path tracer. It also holds what the model of light costs, which no rung changes |
 
-Every rung keeps what the rungs before it have changed. All see as far as 36 km and have steps of one length, near and far,
-as the thesis's have; our High lengthens its steps with the distance.
-";
-
-const WHY: &str = "
-### Why our ratios differ from the thesis's
-
-- **Stop.** What a stop saves is the share of the steps that lie behind opaque cloud. The thesis looks at a sky full of cloud,
-  our view holds blue sky and thin edges too, and rays that never get dark do not stop.
-- **Skip.** The thesis's march towards the sun starts at every step, in clear air as well, until the density is looked at
-  first; so skipping gains a factor of ten. Our march never lights a sample without density, with `density_skip` at 0 too:
-  that saving cannot be switched off, is part of every rung, and leaves only the thin edges for the skip to gain.
-- **Window.** The step grows from 9 m to 100 m, so the steps fall to 1/11. The gain is nearer to that the more of a frame is
-  steps: below it there is what every ray costs before its first step.
-- **Adaptive step.** The thesis takes long steps through empty air and steps back on entry. We ask the coverage map's pyramid of
-  maxima, which never steps over a cloud and never back. It gains where the map is 0. In this sky it is so nowhere, since
-  some coverage is added everywhere (`model.coverage`), which noise takes away again; that gains by reading no further where
-  nothing can be left, which every rung does.
-- **Half and quarter.** Rays fall to 1/4 and 1/16. The time follows as long as there are rays enough to fill the device: at a
-  few milliseconds the thesis's GPU no longer has them, and at quarter resolution a small picture of ours leaves workgroups
-  of 8×8 rays partly empty. Coarser rays also read coarser noise, which leaves a little less cloud to light: see the
-  luminance of those rungs.
-- **Our High against the adaptive rung.** It has a quarter of the rays and 16 frames in place of 8, so half as many samples a
-  pixel. The error of transmittance is the same, since each pixel takes the samples nearest to it; relMSE, which goes by
-  single pixels' light, stays a tenth higher. And a quarter of the cost leaves nothing for what a frame costs beside its rays.
+Every rung keeps what the rungs before it have changed. All see as far as each other, and have steps of one length, near and
+far, as the thesis's have; our High lengthens its steps with the distance. Every rung's settings stand below.
 ";
 
 pub fn write(results: &Results) -> String {
@@ -105,7 +86,6 @@ fn ladder(results: &Results) -> String {
     }
     text += &high_against_adaptive(results);
     text += &format!("\n![Time of each rung]({}/ladder.svg)\n", results.pictures);
-    text += WHY;
     text += "\n### Every rung's settings\n\n";
     for step in &results.steps {
         text += &format!("- {}: `{}`\n", step.label, step.options);
@@ -167,20 +147,22 @@ fn one_study(results: &Results, study: &Study) -> String {
     }
     let table = table(&["", study.x, "march, ms", "FLIP to the last of the line"], &rows);
     let said = match study.name {
-        "eye" => {
-            "Costa finds the time linear in the eye steps, and no visible gain beyond 64. Steps here divide the layer's 2 km; a \
-             slanting ray takes more of them."
-        }
-        "light" => {
-            "Costa finds the time about linear in the light steps, and takes 32. Ours rises less: of what a lit sample reads, up to \
-             eleven readings are for diffuse light and for shadow from afar, whatever the light steps. Steps here are of one length \
-             and reach 1 km together; our presets lengthen them instead, and need 4 to 12."
-        }
-        "noise" => {
-            "Costa finds little change up to 256 texels and a jump at 512. Ours end at 256; the view and the mip levels \
-             decide how much of a volume is read, not its size."
-        }
-        _ => "Costa finds the time growing with the pixels from about 1280×720 on: below that, her GPU was not full.",
+        "eye" => format!(
+            "Costa finds the time linear in the eye steps, and no visible gain beyond 64. Steps here divide the layer's {} km; a \
+             slanting ray takes more of them.",
+            THICKNESS / 1000.0
+        ),
+        "light" => format!(
+            "Costa finds the time about linear in the light steps, and takes 32. Of what a lit sample of ours reads, some is for \
+             diffuse light and for shadow from afar, whatever the light steps. Steps here are of one length and reach {} km \
+             together; our presets lengthen them instead, and need fewer.",
+            LIGHT_REACH / 1000.0
+        ),
+        "noise" => "Costa finds little change up to 256 texels and a jump at 512, which is more than ours may have; the view and \
+                    the mip levels decide how much of a volume is read, not its size."
+            .to_owned(),
+        _ => "Costa finds the time growing with the pixels from about 1280×720 on: below that, her GPU was not full."
+            .to_owned(),
     };
     format!("\n## {}\n\n{said}\n\n![{}]({}/{}.svg)\n\n{table}", study.title, study.title, results.pictures, study.name)
 }

@@ -48,8 +48,8 @@ const PLAIN: &str = "--quality high --set quality.resolution=full --set quality.
     --set quality.transmittance_stop=0 --set quality.density_skip=0 --set quality.max_steps=8192 \
     --set quality.max_distance=36000 --set quality.light_growth=1";
 /// The layer's thickness in the scene (m), which the eye steps divide, and the reach of the light steps (m).
-const THICKNESS: f64 = 2000.0;
-const LIGHT_REACH: f64 = 1000.0;
+pub const THICKNESS: f64 = 2000.0;
+pub const LIGHT_REACH: f64 = 1000.0;
 
 /// Texels along a side of the noise volumes.
 const NOISE: [u32; 4] = [32, 64, 128, 256];

@@ -9,7 +9,7 @@ use super::{
 use crate::{engine::Job, metrics::Truth, sheet};
 
 /// The converged still: as many frames as a window holds, of half the steps of the default, which holds as many.
-const CONVERGED: &str = "--set quality.temporal=sliding_window --set quality.window=16 --set quality.step=50 \
+pub const CONVERGED: &str = "--set quality.temporal=sliding_window --set quality.window=16 --set quality.step=50 \
                          --set quality.step_growth=0.0045";
 const CONVERGED_AFTER: u32 = 16;
 

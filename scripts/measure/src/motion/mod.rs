@@ -14,6 +14,7 @@ use serde_json::Value;
 use crate::{
     Common,
     engine::Engine,
+    label::fill,
     machine::Machine,
     picture::{Picture, encode},
     progress::Progress,
@@ -60,6 +61,10 @@ struct Results {
     size: String,
     zoom: f64,
     sky: bool,
+    /// The default's, if it is a preset.
+    preset: Option<&'static str>,
+    /// Names of [`MODES`], with their settings.
+    modes: Vec<String>,
     motions: Vec<Moved>,
     /// Of each of [`FLICKERS`], for each mode.
     flicker: Option<Vec<Vec<f64>>>,
@@ -92,12 +97,15 @@ pub fn run(options: &Options) -> Result<()> {
     if !common.keep {
         bench.clear_up()?;
     }
-    let report_path = common.report(&bench.engine, "MOTION.md", options.only.is_empty());
+    let report_path = common.report(&bench.engine, "motion", options.only.is_empty())?;
+    let modes = MODES.iter().map(|mode| fill(mode.name, &bench.engine.effective(mode.options)?));
+    let modes = modes.collect::<Result<Vec<_>>>()?;
+    let preset = bench.engine.quality_preset(None)?;
     let Bench { size, zoom, real_sky, progress, .. } = bench;
     let seconds = progress.seconds();
     drop(progress);
-    let machine = Machine::this(&adapter);
-    let results = Results { size, zoom, sky: real_sky, motions, flicker, machine, seconds };
+    let machine = Machine::this(&adapter, &common.repository);
+    let results = Results { size, zoom, sky: real_sky, preset, modes, motions, flicker, machine, seconds };
     fs::write(&report_path, report::write(&results))
         .with_context(|| format!("cannot write {}", report_path.display()))?;
     println!("{}", report_path.display());

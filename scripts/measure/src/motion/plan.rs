@@ -91,6 +91,7 @@ pub const FLICKER_FRAMES: u32 = 5;
 
 /// A way of combining frames.
 pub struct Mode {
+    /// With settings in braces, as `label::fill` takes them.
     pub name: &'static str,
     pub options: &'static str,
     /// Frames after which little is left of what was before.
@@ -100,8 +101,8 @@ pub struct Mode {
 pub const MODES: [Mode; 5] = [
     // As many as its time is measured by: it has no memory.
     Mode { name: "Off", options: "--set quality.temporal=off", memory: 4 },
-    Mode { name: "SlidingWindow(16)", options: "--set quality.temporal=sliding_window", memory: 20 },
-    Mode { name: "Exponential(0.05)", options: "--set quality.temporal=exponential", memory: 48 },
+    Mode { name: "SlidingWindow({quality.window})", options: "--set quality.temporal=sliding_window", memory: 20 },
+    Mode { name: "Exponential({quality.alpha})", options: "--set quality.temporal=exponential", memory: 48 },
     // The mean of eight samples, of which each texel has one in four frames, or in sixteen.
     Mode { name: "Upscale 2×2", options: "--set quality.temporal=upscale --set quality.block=two", memory: 40 },
     Mode { name: "Upscale 4×4", options: "--set quality.temporal=upscale --set quality.block=four", memory: 144 },
