@@ -6,13 +6,13 @@ use bevy_cumulus::prelude::*;
 /// Built-in presets, in turn. The app begins with the last.
 const SKIES: [&str; 4] = ["Broken", "Storm", "AfterRain", "FairWeatherCumulus"];
 /// How long one sky takes to become the next, in seconds of the clouds' clock. Afterwards it stays as long.
-const CHANGE: f64 = 600.0;
+const CHANGE: f64 = 300.0;
 
 fn main() {
     App::new()
         .add_plugins((DefaultPlugins, CloudsPlugin))
-        // A minute of cloud time each second: transitions and wind follow this clock, and nothing else.
-        .insert_resource(CloudClock { seconds: 0.0, speed: 60.0 })
+        // Twenty seconds of cloud time each second: transitions and wind follow this clock, and nothing else.
+        .insert_resource(CloudClock { seconds: 0.0, speed: 20.0 })
         .add_systems(Startup, setup)
         .add_systems(Update, change)
         .run();
