@@ -247,7 +247,6 @@ impl Plan {
             ("--size", self.size == other.size),
             ("--no-sky", self.sky == other.sky),
             ("--msaa", self.msaa == other.msaa),
-            ("--debug", self.debug == other.debug),
             ("a setting of textures", self.settings.textures == other.settings.textures),
         ];
         same.into_iter().find_map(|(what, same)| (!same).then_some(what))

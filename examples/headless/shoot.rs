@@ -325,9 +325,12 @@ impl Studio {
         }
     }
 
-    /// Exposes as the plan says.
+    /// Exposes as the plan says, and shows the stage that it asks for.
     fn expose(&mut self, plan: &Plan) {
         for camera in self.cameras() {
+            if let Some(mut view) = self.app.world_mut().get_mut::<CloudView>(camera) {
+                view.debug = plan.debug;
+            }
             if let Some(mut exposure) = self.app.world_mut().get_mut::<bevy::camera::Exposure>(camera) {
                 exposure.ev100 = plan.ev100;
             }

@@ -9,13 +9,15 @@ use bevy::{
     asset::AssetPlugin,
     math::DVec3,
     prelude::*,
-    reflect::{GetPath, NamedField, ReflectRef, TypeInfo, Typed, structs::StructInfo},
+    reflect::{GetPath, NamedField, ReflectRef, TypeInfo, Typed},
 };
 use bevy_cumulus::{
     prelude::*,
     settings::{CloudSettings, LayerKind, MAX_LAYERS, MapChannels, SettingsError, Validate, snake_case},
 };
 use serde::{Serialize, de::DeserializeOwned};
+
+use crate::support::declared::{declared_in, struct_info};
 
 /// Settings none of whose parts is the default.
 fn unusual() -> CloudSettings {
@@ -86,26 +88,6 @@ fn text_of(field: &dyn PartialReflect) -> String {
     } else {
         panic!("{:?} has no text", field.reflect_type_path())
     }
-}
-
-fn struct_info(info: &'static TypeInfo) -> &'static StructInfo {
-    match info {
-        TypeInfo::Struct(info) => info,
-        other => panic!("{} is not a struct", other.type_path()),
-    }
-}
-
-/// Every field below `root` with its path; of a struct within, its fields and not itself.
-fn declared_in(root: &str, info: &'static TypeInfo) -> Vec<(String, &'static NamedField)> {
-    let of = |field: &'static NamedField| {
-        let path = format!("{root}.{}", field.name());
-        let vector = field.is::<Vec3>() || field.is::<DVec3>();
-        match field.type_info() {
-            Some(inner @ TypeInfo::Struct(_)) if !vector => declared_in(&path, inner),
-            _ => vec![(path, field)],
-        }
-    };
-    struct_info(info).iter().flat_map(of).collect()
 }
 
 /// Those of the settings that paths lead to, in the order of [`CloudSettings::paths`] where there are no layers; then others.

@@ -2,6 +2,7 @@
 
 pub mod adding_doubling;
 pub mod app;
+pub mod declared;
 pub mod density;
 pub mod evaluate;
 pub mod golden;
