@@ -150,7 +150,9 @@ impl Studio {
         let limit = world.resource::<RenderDevice>().limits().max_texture_dimension_2d;
         ensure!(width.max(height) <= limit, "--size {width}x{height}: this device makes at most {limit} pixels a side");
         let hills = plan.scene.hills;
-        common::spawn_land(world, hills);
+        if plan.land {
+            common::spawn_land(world, hills);
+        }
         let sun = common::spawn_sky(world, plan.sun(0), plan.sky, hills);
 
         let mut images = world.resource_mut::<Assets<Image>>();

@@ -175,7 +175,7 @@ fn a_full_disk_is_an_error() {
     let folder = Folder::new();
     let output = run_in(
         &folder,
-        &[&["--size", "8x8", "--frames", "1", "--no-sky", "--timings", "/dev/full"], &SMALL[..]].concat(),
+        &[&["--size", "8x8", "--frames", "1", "--no-sky", "--no-land", "--timings", "/dev/full"], &SMALL[..]].concat(),
     );
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(!output.status.success() && said.contains("/dev/full") && !said.contains("panicked"), "{said}");
@@ -271,7 +271,8 @@ fn the_same_command_gives_the_same_clouds_from_any_folder() {
 #[test]
 fn moves_are_made_before_every_frame_but_the_first() {
     // Nothing is carried from frame to frame, so the last one is as if it stood alone.
-    let alone = ["--size", "32x18", "--set", "quality.temporal=off", "--set", "quality.offsets=false", "--no-sky"];
+    let alone =
+        ["--size", "32x18", "--set", "quality.temporal=off", "--set", "quality.offsets=false", "--no-sky", "--no-land"];
     let moving =
         "--frames 3 --camera -50,100,0,-10,20 --move 0,100,0,5,0 --sun 40,-20 --sun-move 1,-2 --time 100 --dt 10";
     let standing = "--frames 1 --camera -50,300,0,0,20 --sun 42,-24 --time 120";
@@ -284,7 +285,8 @@ fn moves_are_made_before_every_frame_but_the_first() {
 #[test]
 fn without_sky_and_cloud_the_picture_is_black_above() {
     let clear = ["--set", "model.coverage=-1", "--camera", "0,2,0,0,60"];
-    let files = ["--size", "16x16", "--frames", "1", "--no-sky", "--out", "shot.png", "--cloud", "cloud.exr"];
+    let files =
+        ["--size", "16x16", "--frames", "1", "--no-sky", "--no-land", "--out", "shot.png", "--cloud", "cloud.exr"];
     let folder = render(&[&files[..], &clear].concat());
     assert!(read(&folder.join("shot.png")).to_rgb8().pixels().all(|p| p.0 == [0; 3]));
     assert!(read_cloud(&folder.join("cloud.exr")).pixels().all(|p| p.0 == [0.0, 0.0, 0.0, 1.0]));
@@ -292,7 +294,7 @@ fn without_sky_and_cloud_the_picture_is_black_above() {
 
 #[test]
 fn a_batch_makes_the_pictures_that_its_lines_make_alone() {
-    let still = ["--size", "32x18", "--frames", "1", "--no-sky"];
+    let still = ["--size", "32x18", "--frames", "1", "--no-sky", "--no-land"];
     let still = [&still[..], &["--set", "quality.temporal=off", "--set", "quality.offsets=false"]].concat();
     let lines = ["--set model.coverage=0.3", "--set model.coverage=-0.2 --set quality.resolution=quarter --time 50"];
     let together = render_batch(&still, lines);

@@ -5,9 +5,7 @@ use bevy_cumulus::prelude::*;
 
 use super::{
     Expect::{By, Over, Times, Under},
-    Row, each,
-    layer_rows,
-    model_rows,
+    Row, each, layer_rows, model_rows,
     picture::{PictureLab, SharedLab, into_the_sun, up, with_the_sun},
     scene::Scene,
 };

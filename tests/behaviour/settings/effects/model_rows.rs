@@ -90,13 +90,7 @@ fn cleared() -> Scene {
 }
 
 /// Both fields after some seconds: how they differ, as they are and followed by `shift`.
-pub fn after(
-    lab: &mut FieldLab,
-    seconds: f64,
-    a: &Scene,
-    b: &Scene,
-    shift: impl Fn(f32) -> Vec3,
-) -> [f32; 2] {
+pub fn after(lab: &mut FieldLab, seconds: f64, a: &Scene, b: &Scene, shift: impl Fn(f32) -> Vec3) -> [f32; 2] {
     let [a, b] = [a, b].map(|scene| {
         let mut scene = scene.clone();
         scene.settings.clock.seconds += seconds;

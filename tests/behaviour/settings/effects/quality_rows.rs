@@ -117,8 +117,7 @@ fn flicker(lab: &mut PictureLab, scene: &Scene) -> f32 {
 fn shade_error(lab: &mut PictureLab, scene: &Scene) -> f32 {
     let mut fine = scene.clone();
     let quality = &fine.settings.quality;
-    fine.settings.quality =
-        CloudQuality { light_steps: 64, light_step: 20.0, light_growth: 1.02, ..quality.clone() };
+    fine.settings.quality = CloudQuality { light_steps: 64, light_step: 20.0, light_growth: 1.02, ..quality.clone() };
     let fine = lab.of(&fine);
     lab.of(scene).difference(&fine)
 }

@@ -124,8 +124,7 @@ impl Images {
             let depth = if is_volume { 8 } else { 1 };
             let dimension = if is_volume { TextureDimension::D3 } else { TextureDimension::D2 };
             let size = Extent3d { width: 8, height: 8, depth_or_array_layers: depth };
-            let image =
-                Image::new_fill(size, dimension, &colour, TextureFormat::Rgba8Unorm, RenderAssetUsages::all());
+            let image = Image::new_fill(size, dimension, &colour, TextureFormat::Rgba8Unorm, RenderAssetUsages::all());
             app.world_mut().resource_mut::<Assets<Image>>().add(image)
         };
         self.0.entry((colour, is_volume)).or_insert_with(made).clone()
