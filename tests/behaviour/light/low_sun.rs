@@ -242,8 +242,12 @@ fn high_clouds_are_lit_after_low_ones(stage: &mut Stage) {
 
 fn the_sky_darkens_with_the_sun(stage: &mut Stage) {
     let fallback = f64::from(CloudLighting::default().sky_fallback.y);
-    // In thin cloud under an even sky half of what is scattered came from above.
-    let whole = ALBEDO * 0.5 * fallback * SUN * BELOW.seen(|_| 1.0);
+    // In thin cloud under an even sky what is scattered came from above the horizon: half, and what its dip adds.
+    let above = |p: DVec3| {
+        let h = altitude(p, PLANET_RADIUS);
+        0.5 + 0.5 * (h * (2.0 * PLANET_RADIUS + h)).sqrt() / (PLANET_RADIUS + h)
+    };
+    let whole = ALBEDO * fallback * SUN * BELOW.seen(above);
     stage.set_sun(58.0);
     let noon = stage.radiance(BELOW);
     assert!((noon[1] / whole - 1.0).abs() < TRACED, "the sky gives {}, not {whole}", noon[1]);

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 use bevy_cumulus::prelude::*;
 
 use crate::support::{
-    app::{View, cloud_pixels, new_clouds_app, spawn_sun, until_drawn},
+    app::{View, cloud_pixels, clouds_of_a_larger_map, spawn_sun, until_drawn},
     gpu::run_updates,
     scene::{exact, settle, spawn_linear, steps},
     shared::SharedApp,
@@ -19,9 +19,7 @@ fn mean(values: impl Iterator<Item = f32> + Clone) -> f32 {
 
 /// The built-in clouds from the ground, each step where it always is.
 fn built_in() -> (SharedApp, View) {
-    // A map whose texels are not as wide as the gaps between clouds: else nothing is known to be empty.
-    let textures = CloudTextures { volume_size: 32, map_size: 512, ..default() };
-    let mut app = SharedApp::with_textures("clouds of a larger map", textures, new_clouds_app);
+    let mut app = clouds_of_a_larger_map();
     spawn_sun(&mut app, Vec3::new(-0.4, -1.0, -0.3));
     let up = Transform::from_xyz(0.0, 10.0, 0.0).with_rotation(Quat::from_rotation_x(35_f32.to_radians()));
     let view = spawn_linear(&mut app, SIZE, up);

@@ -41,31 +41,25 @@ fn the_model_knows_nothing_of_the_renderer() {
 fn modules_of_the_model(text: &str) -> Vec<String> {
     let mut found = Vec::new();
     let imports = text.split("import ").skip(1).filter_map(|rest| rest.split(';').next());
-    for import in imports {
-        let Some((_, names)) = import.split_once("::model::").filter(|(start, _)| !start.contains('{')) else {
+    for names in imports.filter_map(|import| import.trim_start().strip_prefix("package::model::")) {
+        if !names.starts_with('{') {
+            found.extend(names.split("::").next().map(str::to_owned));
             continue;
-        };
+        }
+        // Outermost in the braces; deeper names are a module's own.
         let mut depth = 0;
-        let mut word = String::new();
-        let outer = usize::from(names.starts_with('{'));
-        for c in names.chars() {
-            match c {
-                '{' => depth += 1,
-                '}' => depth -= 1,
-                ':' if depth == outer && !word.is_empty() => found.push(std::mem::take(&mut word)),
-                ',' => word.clear(),
-                c if c.is_alphanumeric() || c == '_' => {
-                    if depth == outer {
-                        word.push(c);
-                    }
-                }
-                _ => {}
+        for part in names.split_inclusive(['{', '}', ',']) {
+            if depth == 1 {
+                found.extend(part.split("::").next().map(|module| module.trim().to_owned()));
             }
-            if outer == 0 && !found.is_empty() {
-                break;
+            match part.chars().last() {
+                Some('{') => depth += 1,
+                Some('}') => depth -= 1,
+                _ => {}
             }
         }
     }
+    found.retain(|module| module.chars().any(char::is_alphabetic));
     found
 }
 

@@ -11,7 +11,9 @@ use crate::support::{
     adding_doubling::{Slab, moments},
     app::{View, cloud_pixels, spawn_sun, until_drawn},
     gpu::{run_updates, times_logged},
-    path_trace::{assert_near, frames, light_from, mean, mixed_slab, noise, spawn_pinhole, sun_light, traced_app},
+    path_trace::{
+        assert_near, frames, light_from, mean, mixed_slab, noise, pose, spawn_pinhole, sun_light, traced_app,
+    },
 };
 
 pub fn of(function: PhaseFunction, g: f32) -> CloudPhase {
@@ -35,9 +37,12 @@ pub fn single(app: &mut App, lighting: CloudLighting) {
     });
 }
 
-/// The picture's middle with the sun at this angle from the camera's direction, straight up.
+/// The picture's middle with the sun at this angle from the camera's direction: straight up, or down where the sun would
+/// stand below the ground.
 pub fn middle(app: &mut App, view: &View, sun: Entity, degrees: f32) -> Vec4 {
-    let towards = Quat::from_rotation_z(degrees.to_radians()) * Vec3::Y;
+    let up = if degrees > 90.0 { -1.0 } else { 1.0 };
+    let towards = Quat::from_rotation_z(degrees.to_radians()) * (Vec3::Y * up);
+    app.world_mut().entity_mut(view.camera).insert(pose(up.into()));
     app.world_mut().entity_mut(sun).insert(Transform::default().looking_to(-towards, Vec3::Z));
     run_updates(app, 1);
     cloud_pixels(app, view)[0]

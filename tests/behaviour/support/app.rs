@@ -57,6 +57,13 @@ pub fn clouds_app() -> SharedApp {
     SharedApp::of_kind("clouds", new_clouds_app)
 }
 
+/// [`clouds_app`] with a map whose texels are not as wide as the gaps between clouds: with a smaller one no air is known to
+/// be empty.
+pub fn clouds_of_a_larger_map() -> SharedApp {
+    let textures = CloudTextures { volume_size: 32, map_size: 512, ..default() };
+    SharedApp::with_textures("clouds of a larger map", textures, new_clouds_app)
+}
+
 /// [`clouds_app`], started now and for this test alone.
 pub fn new_clouds_app() -> App {
     new_clouds_app_with(CloudsPlugin)

@@ -60,11 +60,16 @@ pub fn sun_light(phase: PhaseFunction) -> CloudLighting {
     CloudLighting { sky_fallback: Vec3::ZERO, sun_strength: 1.0, ..sky_light(phase) }
 }
 
-/// A camera that sees one direction: up by `mu`, the cosine to the vertical, from just outside the slab.
-pub fn spawn_pinhole(app: &mut App, size: UVec2, mu: f64) -> View {
+/// Where a camera that looks up by `mu`, the cosine to the vertical, stands just outside the slab.
+pub fn pose(mu: f64) -> Transform {
     let height = if mu > 0.0 { BOTTOM - 20.0 } else { BOTTOM + THICKNESS + 20.0 };
     let direction = DVec3::new((1.0 - mu * mu).max(0.0).sqrt(), mu, 0.0).as_vec3();
-    let looking = Transform::from_xyz(0.0, height as f32, 0.0).looking_to(direction, Vec3::Z);
+    Transform::from_xyz(0.0, height as f32, 0.0).looking_to(direction, Vec3::Z)
+}
+
+/// A camera that sees one direction: up by `mu`, from just outside the slab.
+pub fn spawn_pinhole(app: &mut App, size: UVec2, mu: f64) -> View {
+    let looking = pose(mu);
     let view = spawn_view(app, size, looking, Sky::Black);
     let narrow = PerspectiveProjection { fov: 0.002, ..default() };
     app.world_mut().entity_mut(view.camera).insert(Projection::Perspective(narrow));
