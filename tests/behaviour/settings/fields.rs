@@ -17,7 +17,7 @@ use bevy_cumulus::{
 };
 use serde::{Serialize, de::DeserializeOwned};
 
-use crate::support::declared::{declared_in};
+use crate::support::declared::declared_in;
 
 /// Settings none of whose parts is the default.
 fn unusual() -> CloudSettings {
