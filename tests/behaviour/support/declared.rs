@@ -7,7 +7,7 @@ use bevy::{
 };
 
 /// What is declared of a struct.
-pub fn struct_info(info: &'static TypeInfo) -> &'static StructInfo {
+fn struct_info(info: &'static TypeInfo) -> &'static StructInfo {
     match info {
         TypeInfo::Struct(info) => info,
         other => panic!("{} is not a struct", other.type_path()),

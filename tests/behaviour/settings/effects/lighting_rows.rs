@@ -127,7 +127,9 @@ fn sun() -> Vec<Row<PictureLab>> {
         each("lighting.contribution", octaves, ["1", "0.5"], light, Under(0.8)),
         each("lighting.eccentricity", || { let mut s = octaves(); s.set("model.extinction", "0.003"); s },
             ["0.2", "0.95"], forward, Over(1.5)),
-        each("lighting.diffusion", octaves, ["0", "5.25"], light, Over(1.3)),
+        // So deep that the octaves' light is lost.
+        each("lighting.diffusion", || { let mut s = octaves(); s.set("model.extinction", "0.05"); s }, ["0", "5.25"],
+            light, Over(10.0)),
         each("lighting.diffusion", diffuse, ["5", "10"], light, Over(1.5)),
         each("lighting.diffusion_asymmetry", diffuse, ["0", "0.6"], forward, Over(1.5)),
         each("lighting.sun_strength", thin, ["1", "2"], light, Times(2.0, 2e-3)),
