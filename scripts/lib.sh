@@ -1,5 +1,5 @@
 # shellcheck shell=bash
-# What scripts/demo and scripts/test share: where things are, how cargo is called, and what the machine must have.
+# What the scripts share: where things are, how cargo is called, and what the machine must have.
 # Sourced, never run. Works with the bash 3.2 of macOS.
 
 repo_root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
@@ -9,7 +9,7 @@ export CARGO_TARGET_DIR="${CARGO_TARGET_DIR:-${XDG_CACHE_HOME:-$HOME/.cache}/bev
 export BEVY_ASSET_ROOT="${BEVY_ASSET_ROOT:-$repo_root}"
 
 # One feature set for all that the scripts build: with a second one, cargo would compile Bevy a second time.
-# shellcheck disable=SC2034 # used by both scripts
+# shellcheck disable=SC2034 # used by the scripts
 features=(--features inspector)
 
 rust_bevy_declares=1.97.1 # what Bevy 0.20.1 asks for; it builds on less
@@ -119,6 +119,14 @@ ensure_cc() {
     apt update
     apt install gcc libc6-dev
     cc_works || die "cc does not compile an empty program, even with gcc and libc6-dev installed"
+}
+
+ensure_cxx() { # the measuring tool holds FLIP, a measure of visible difference, which is C++
+    has c++ && return
+    case "$(uname -s)" in
+        Darwin | MINGW* | MSYS*) missing+=("a C++ compiler") && return ;;
+    esac
+    install_for "the measuring tool" g++
 }
 
 # ---- Vulkan ----------------------------------------------------------------------------------------------------------
@@ -293,7 +301,7 @@ ensure_virtual_display() { # to open windows where there is no screen, and to pr
     install_for "the window tests" ${packages[@]+"${packages[@]}"}
 }
 
-# ---- both scripts ----------------------------------------------------------------------------------------------------
+# ---- all scripts ----------------------------------------------------------------------------------------------------
 
 set_up() { # set_up [ENSURE_...]: what every script needs, and what this one needs besides
     ensure_rust

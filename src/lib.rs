@@ -16,21 +16,33 @@
 //!
 //! # A frame, top to bottom
 //! ```text
-//! settings (resources)  ->  textures (baked on the GPU or loaded as assets)  ->  model: "what is at p?"
-//!                                                                                  |  one shader interface
-//!    per camera:      sky light -> march -> accumulate -> composite   <------------+
+//! presets, weather maps, METAR reports
+//!          |  transition: one sky turns into another
+//!          v
+//! settings (resources)  ->  textures (baked on the GPU or loaded)  ->  model: "what is at p?"  ->  query (on the CPU)
+//!          |                                                              |  one shader interface
+//!          +------------->  phases (tables of phase functions)  ------+   |
+//!                                                                     v   v
+//!    per camera:      sky light -> march (or path tracer) -> accumulate -> composite
 //!                     (after the opaque scene) -> drawn among transparent things, or over them
 //! ```
 //!
-//! | plugin | what it adds |
+//! | part | what it is |
 //! |---|---|
-//! | settings | [`CloudModel`], [`CloudLighting`], [`CloudQuality`], [`CloudTextures`], [`CloudClock`]; checks; presets |
-//! | textures | noise volumes, cloud maps, blue noise; slots for your own |
-//! | phases | phase functions that are tables: computed, or your own |
+//! | [`settings`] | [`CloudModel`], [`CloudLayers`], [`CloudLighting`], [`CloudQuality`] and others; checks; presets |
+//! | transition | [`CloudWeather`] turns one sky into another |
+//! | [`weather`] | maps that say where a layer's cloud is: made from a recipe, painted, or read from a METAR report |
+//! | [`textures`] | noise volumes, cloud maps, blue noise; slots for your own |
+//! | [`phases`] | phase functions that are tables: computed, or your own |
 //! | model | the shader module that says where cloud is; [`ModelShader`] replaces it |
 //! | render | the passes of each camera with a [`CloudView`] |
+//! | query | [`CloudField`] answers on the CPU: density, visibility, sunlight |
+//! | [`reference`] | the renderer's maths on the CPU, and what the path tracer is tested against |
 //!
 //! The plugin spawns nothing: the sun is the scene's brightest `DirectionalLight`, the sky its `Atmosphere`.
+//!
+//! Shaders of yours import from `bevy_cumulus`: [`cloud_fade`](CloudDepth) for materials, and what a
+//! [`ModelShader`] is made of. What other modules hold may move in any version.
 #![warn(missing_docs)]
 
 mod capability;
@@ -41,6 +53,8 @@ pub mod phases;
 pub mod reference;
 mod render;
 pub mod settings;
+#[doc(hidden)]
+pub mod testing;
 pub mod textures;
 pub mod weather;
 
@@ -77,6 +91,17 @@ pub mod prelude {
     };
 }
 
+/// What users' shaders import from `bevy_cumulus`: a module at the crate's root, whose names stay when modules move.
+pub(crate) const PUBLIC_SHADER: &str = include_str!("lib.wesl");
+/// Path whose module path is the crate's name alone. `embedded_asset!` has none for a file at the root.
+pub(crate) const PUBLIC_SHADER_PATH: &str = "embedded://bevy_cumulus.wesl";
+
+/// Keeps [`PUBLIC_SHADER`] loaded.
+#[derive(Resource)]
+struct PublicShader {
+    _shader: Handle<Shader>,
+}
+
 /// Adds volumetric clouds to every camera with a [`CloudView`].
 ///
 /// Add it after `DefaultPlugins`. On a device that cannot run compute shaders it warns once and draws nothing.
@@ -91,6 +116,9 @@ impl Plugin for CloudsPlugin {
         if !app.world().contains_resource::<Assets<Image>>() {
             app.init_asset::<Image>();
         }
+        let shader = Shader::from_wesl(PUBLIC_SHADER, PUBLIC_SHADER_PATH);
+        let shader = app.world_mut().resource_mut::<Assets<Shader>>().add(shader);
+        app.insert_resource(PublicShader { _shader: shader });
         load_shader_library!(app, "counts.wesl");
         app.add_plugins((
             settings::CloudSettingsPlugin,
@@ -118,7 +146,21 @@ impl Plugin for CloudsPlugin {
     }
 }
 
-/// Compiles the README's quick start.
+/// Compiles the Rust in README.md and docs/.
 #[cfg(doctest)]
-#[doc = include_str!("../README.md")]
-struct Readme;
+mod pages {
+    macro_rules! pages {
+        ($($(#[$when:meta])? $name:ident: $file:literal),* $(,)?) => {
+            $($(#[$when])? #[doc = include_str!($file)] struct $name;)*
+        };
+    }
+    pages! {
+        Readme: "../README.md",
+        HowItWorks: "../docs/how-it-works.md",
+        Queries: "../docs/queries.md",
+        Shaders: "../docs/shaders.md",
+        Transparency: "../docs/transparency.md",
+        #[cfg(feature = "metar")]
+        Weather: "../docs/weather.md",
+    }
+}

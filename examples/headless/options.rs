@@ -26,7 +26,7 @@ pub struct Options {
     #[arg(long)]
     pub effective: bool,
     /// Make many pictures in one go: each line of the file holds the options of one, added to those given here. They
-    /// share scene, size and textures; nothing is quoted, `#` begins a comment
+    /// share size, textures, sky and what stands on the ground; nothing is quoted, `#` begins a comment
     #[arg(long, value_name = "FILE", conflicts_with_all = ["list", "effective"])]
     pub batch: Option<PathBuf>,
     /// With --batch: begin each picture only when a line comes in on standard input, so that two programs can take turns
@@ -39,6 +39,9 @@ pub struct Options {
     /// for programs step_count, sample_count, read_count (see --counts)
     #[arg(long, value_name = "NAME", value_parser = debug_view)]
     pub debug: Option<CloudDebugView>,
+    /// No ground, hills or buildings: nothing but sky and clouds
+    #[arg(long)]
+    pub no_land: bool,
     /// Size of the picture in pixels, each side from 1 to 8192; of each picture, where a scene is a strip of some
     #[arg(long, value_name = "WxH", default_value = "480x270", value_parser = size)]
     pub size: (u32, u32),
@@ -122,6 +125,7 @@ pub struct Plan {
     pub size: (u32, u32),
     pub frames: u32,
     pub sky: bool,
+    pub land: bool,
     pub msaa: u32,
     pub ev100: f32,
     pub out: Option<PathBuf>,
@@ -177,6 +181,7 @@ impl Options {
             debug: self.debug.unwrap_or(scene.debug),
             preset,
             sky,
+            land: !self.no_land,
             camera,
             sun,
             size: self.size,
@@ -242,11 +247,12 @@ impl Plan {
     /// What differs from a plan whose engine is to render this one too, if anything does.
     pub fn differs_in_setup(&self, other: &Self) -> Option<&'static str> {
         let same = [
-            ("--scene", self.scene.name == other.scene.name),
+            ("--no-land", self.land == other.land),
+            ("a scene's hills", self.scene.hills == other.scene.hills),
+            ("a scene's second camera", self.scene.split == other.scene.split),
             ("--size", self.size == other.size),
             ("--no-sky", self.sky == other.sky),
             ("--msaa", self.msaa == other.msaa),
-            ("--debug", self.debug == other.debug),
             ("a setting of textures", self.settings.textures == other.settings.textures),
         ];
         same.into_iter().find_map(|(what, same)| (!same).then_some(what))
@@ -268,6 +274,7 @@ impl Plan {
             dt: self.dt,
             frames: self.frames,
             sky: self.sky,
+            land: self.land,
             msaa: self.msaa,
             ev100: self.ev100,
             debug: self.debug.name(),
@@ -294,6 +301,7 @@ pub struct Effective<'a> {
     dt: f64,
     frames: u32,
     sky: bool,
+    land: bool,
     msaa: u32,
     ev100: f32,
     debug: String,

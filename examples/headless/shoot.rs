@@ -74,7 +74,7 @@ pub fn shoot(plan: &Plan) -> Result<Shot> {
     if plan.strip.is_empty() { studio.picture(plan) } else { studio.strip(plan) }
 }
 
-/// Renders plans that share scene, size and textures, one after another, and hands each picture on; `wait` comes before each.
+/// Renders plans that share a set-up, one after another, and hands each picture on; `wait` comes before each.
 pub fn shoot_many(
     plans: &[Plan],
     mut wait: impl FnMut() -> Result<()>,
@@ -150,7 +150,9 @@ impl Studio {
         let limit = world.resource::<RenderDevice>().limits().max_texture_dimension_2d;
         ensure!(width.max(height) <= limit, "--size {width}x{height}: this device makes at most {limit} pixels a side");
         let hills = plan.scene.hills;
-        common::spawn_land(world, hills);
+        if plan.land {
+            common::spawn_land(world, hills);
+        }
         let sun = common::spawn_sky(world, plan.sun(0), plan.sky, hills);
 
         let mut images = world.resource_mut::<Assets<Image>>();
@@ -325,9 +327,12 @@ impl Studio {
         }
     }
 
-    /// Exposes as the plan says.
+    /// Exposes as the plan says, and shows the stage that it asks for.
     fn expose(&mut self, plan: &Plan) {
         for camera in self.cameras() {
+            if let Some(mut view) = self.app.world_mut().get_mut::<CloudView>(camera) {
+                view.debug = plan.debug;
+            }
             if let Some(mut exposure) = self.app.world_mut().get_mut::<bevy::camera::Exposure>(camera) {
                 exposure.ev100 = plan.ev100;
             }

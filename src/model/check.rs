@@ -14,6 +14,7 @@ use naga::{
 };
 
 use super::{MODEL_PATH, ModelShaderError, lines};
+use crate::{PUBLIC_SHADER, PUBLIC_SHADER_PATH};
 
 /// What became of a source.
 #[derive(Clone, PartialEq, Debug)]
@@ -27,7 +28,8 @@ pub(super) enum Verdict {
 }
 
 /// Modules that a model may import, as they were when the crate was built: at the app's start they are not loaded yet.
-const LIBRARY: [(&str, &str); 9] = [
+const LIBRARY: [(&str, &str); 10] = [
+    (PUBLIC_SHADER_PATH, PUBLIC_SHADER),
     ("embedded://bevy_cumulus/counts.wesl", include_str!("../counts.wesl")),
     ("embedded://bevy_cumulus/model/medium.wesl", include_str!("medium.wesl")),
     ("embedded://bevy_cumulus/model/planet.wesl", include_str!("planet.wesl")),
@@ -84,7 +86,8 @@ fn refused(source: &str, message: &str) -> Verdict {
     if let Some(verdict) = within.and_then(|name| of_caller(source, name, what)) {
         return verdict;
     }
-    let word = quoted("declaration of `").or(quoted("arguments to `")).map(lines::plain);
+    let word =
+        ["declaration of `", "arguments to `", "has no declaration `"].into_iter().find_map(quoted).map(lines::plain);
     let line = lines::named(message, MODEL_PATH)
         .or_else(|| lines::of_word(source, &word?, within))
         .or_else(|| lines::of(source, within?));

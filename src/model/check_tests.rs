@@ -1,6 +1,6 @@
 use super::*;
 
-const GOOD: &str = "import package::model::{medium::{Medium, empty_medium}, planet::altitude};
+const GOOD: &str = "import bevy_cumulus::{Medium, empty_medium, altitude};
 
 const BASE: f32 = 1000.0; // m
 /* a comment
@@ -13,7 +13,7 @@ fn density_bound(p: vec3<f32>, lod: f32) -> f32 { return 1.0; }
 fn thickness_at(h: f32) -> f32 {
     let a = vec3f(1e-3, 0.5, (h));
     // Between statements.
-    return package::model::planet::altitude(a,
+    return bevy_cumulus::altitude(a,
         6360000.0);
 }
 
@@ -48,6 +48,8 @@ fn a_mistake_is_found_on_its_line() {
         // A name that is nowhere.
         ("(h));", "(height));", 12, "height"),
         ("empty_medium();\n", "no_medium();\n", 19, "no_medium"),
+        // One that is not among those that may be imported.
+        ("altitude};", "height as altitude};", 1, "height"),
         // Types.
         ("        6360000.0);", "        true);", 15, ""),
         ("medium.density = ", "medium.density = 1u * ", 20, ""),
@@ -78,7 +80,7 @@ fn a_function_that_is_missing_is_named() {
 
 #[test]
 fn what_is_not_loaded_is_waited_for() {
-    let import = "import package::model::{";
+    let import = "import bevy_cumulus::{";
     let source = GOOD.replace(import, &format!("import my_game::torus::ring;\n{import}"));
     let source = source.replace("return 1.0", "return ring()");
     assert_eq!(check(&source, std::iter::empty()), Verdict::Waits);

@@ -8,7 +8,6 @@ mod check;
 mod layers;
 mod lines;
 mod places;
-mod probe;
 mod space;
 mod uniform;
 mod zone_at;
@@ -27,11 +26,27 @@ const MODEL_PATH: &str = "embedded://bevy_cumulus/model/model.wesl";
 
 /// A model of your own, as WESL source, in place of the built-in one (example `custom_model`).
 ///
-/// Insert it before adding [`CloudsPlugin`](crate::CloudsPlugin), or at any time later; bind group 1 stays as the
-/// built-in model declares it, and a model need not use any of it. The source must define the three functions of
-/// `bevy_cumulus::model::medium`'s comment. It is compiled on the CPU before it is shown: one that does not compile is logged
-/// with its line and told as [`ModelShaderError`], and the last good model stays, which is the built-in one at first. Remove
-/// the resource, and the built-in model is back.
+/// Insert it before adding [`CloudsPlugin`](crate::CloudsPlugin), or at any time later. The source imports what it needs
+/// from `bevy_cumulus` and must define three functions:
+/// ```wgsl
+/// import bevy_cumulus::{Medium, ONE_PHASE, empty_medium, altitude, planet_radius};
+///
+/// // Lowest and highest altitude that may hold cloud (m).
+/// fn model_bounds() -> vec2<f32> { return vec2(1000.0, 1500.0); }
+///
+/// // Upper bound of the density within 2^lod metres of p.
+/// fn density_bound(p: vec3<f32>, lod: f32) -> f32 { return 1.0; }
+///
+/// // The medium at p, filtered over 2^lod metres.
+/// fn sample_medium(p: vec3<f32>, lod: f32) -> Medium {
+///     let h = altitude(p, planet_radius());
+///     if h < 1000.0 || h > 1500.0 { return empty_medium(); }
+///     return Medium(1.0, 0.002, vec3(0.999), 1.0, vec2(h - 1000.0, 1500.0 - h), ONE_PHASE);
+/// }
+/// ```
+/// `docs/shaders.md` has the optional ones and all that may be imported. The module is compiled on the CPU before it is
+/// shown: one that does not compile is logged with its line and told as [`ModelShaderError`], and the last good model
+/// stays, which is the built-in one at first. Remove the resource, and the built-in model is back.
 #[derive(Resource, Clone, Debug)]
 pub struct ModelShader(pub String);
 

@@ -1,14 +1,17 @@
 //! [`CloudField`] and the plugin that keeps it as the renderer has it.
 
 use bevy::{
-    light::Atmosphere,
+    light::{Atmosphere, SunDisk},
     prelude::*,
     render::RenderApp,
     tasks::{AsyncComputeTaskPool, TaskPool},
 };
 use thiserror::Error;
 
-use super::{planet::Planet, query::CloudSky};
+use super::{
+    planet::{Planet, disc_size},
+    query::CloudSky,
+};
 use crate::{
     model::{ModelModule, ZoneAt},
     render::CloudStatus,
@@ -131,7 +134,9 @@ fn read_images(copies: Res<CpuCopies>, images: Res<Assets<Image>>) {
     }
 }
 
-type Suns<'w, 's> = Query<'w, 's, (&'static DirectionalLight, &'static GlobalTransform, &'static InheritedVisibility)>;
+type SunItems =
+    (&'static DirectionalLight, &'static GlobalTransform, &'static InheritedVisibility, Option<&'static SunDisk>);
+type Suns<'w, 's> = Query<'w, 's, SunItems>;
 
 fn update_field(
     copies: Res<CpuCopies>,
@@ -184,17 +189,22 @@ fn update_field(
         // The renderer says what is wrong with one.
         let valid = zones.iter().filter(|(_, zone, _)| zone.validate().is_ok());
         let zones = valid.filter_map(|(entity, zone, at)| ZoneAt::new(entity, zone, at.translation(), offset));
-        sky = sky.with_zones(zones.collect()).with_planets(&planets).with_sun(brightest(&suns)).at(good.clock.seconds);
-        Ok(sky)
+        let sun = brightest(&suns);
+        sky = sky.with_zones(zones.collect()).with_planets(&planets).at(good.clock.seconds);
+        Ok(sky.with_sun(sun.map(|sun| sun.0)).with_sun_size(sun.map_or(0.0, |sun| sun.1)))
     })();
 }
 
-/// Direction to the scene's brightest light, as the renderer takes it.
-fn brightest(suns: &Suns) -> Option<bevy::math::DVec3> {
+/// Direction to the scene's brightest light and its angular diameter (rad), as the renderer takes them.
+fn brightest(suns: &Suns) -> Option<(bevy::math::DVec3, f64)> {
     suns.iter()
-        .filter(|(_, _, visible)| visible.get())
-        .map(|(light, at, _)| (light.color.to_linear().to_vec3() * light.illuminance, at.back().as_vec3()))
-        .filter(|(illuminance, direction)| illuminance.is_finite() && direction.is_finite())
+        .filter(|(_, _, visible, _)| visible.get())
+        .map(|(light, at, _, disc)| {
+            // Bevy gives a light without one the Earth's.
+            let size = disc.map_or(SunDisk::EARTH.angular_size, |disc| disc.angular_size);
+            (light.color.to_linear().to_vec3() * light.illuminance, at.back().as_vec3(), size)
+        })
+        .filter(|(illuminance, direction, _)| illuminance.is_finite() && direction.is_finite())
         .max_by(|a, b| a.0.element_sum().total_cmp(&b.0.element_sum()))
-        .map(|(_, direction)| direction.as_dvec3())
+        .map(|(_, direction, size)| (direction.as_dvec3(), disc_size(size).into()))
 }

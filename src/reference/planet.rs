@@ -3,6 +3,8 @@
 //! Positions are in the camera's tangent frame: origin on the surface straight below the camera, y up, the camera at
 //! (0, `h0`, 0). Lengths in metres.
 
+use std::f64::consts::PI;
+
 use bevy::math::{DVec2, DVec3, Vec3};
 
 /// Radius of the planet where the scene's `Atmosphere` gives none (m).
@@ -80,6 +82,35 @@ pub fn ground_distance(h0: f64, mu: f64, radius: f64) -> Option<f64> {
     shell_roots(h0, mu, 0.0, radius).filter(|[_, last]| *last > 0.0).map(|[first, _]| first.max(0.0))
 }
 
+/// The smallest radius of a sun's disc that is told from a point (rad), as in the shader.
+const SMALLEST_DISC: f64 = 1e-5;
+
+/// Share of the sun's disc that can be seen past the planet from altitude `h` (m), 0..=1.
+///
+/// `mu` is the cosine between up and the disc's middle, `size` its angular diameter (rad; 0 is a point). The horizon dips
+/// by acos(R / (R + h)) and crosses the disc as a straight line; from below the surface it is level.
+pub fn visible_sun(h: f64, mu: f64, size: f64, radius: f64) -> f64 {
+    let height = h.max(0.0);
+    let from_centre = radius + height;
+    let dip_sine = (height * (2.0 * radius + height)).sqrt() / from_centre;
+    let elevation = mu * (radius / from_centre) + (1.0 - mu * mu).max(0.0).sqrt() * dip_sine;
+    let half = (0.5 * size).max(SMALLEST_DISC);
+    let d = elevation / (half * (1.0 - half * half / 6.0));
+    if d >= 1.0 {
+        1.0
+    } else if d > -1.0 {
+        // A circular segment's share of its circle.
+        0.5 + (d * (1.0 - d * d).sqrt() + d.asin()) / PI
+    } else {
+        0.0
+    }
+}
+
+/// The angular diameter of a sun (rad) that a scene gives; what cannot be one is that of a point.
+pub(crate) fn disc_size(angular_size: f32) -> f32 {
+    if (0.0..=std::f32::consts::PI).contains(&angular_size) { angular_size } else { 0.0 }
+}
+
 /// The parts of a ray between the shells `bottom` and `top` within 0..=`t_max`, as if there were no surface.
 pub fn layer_intervals(h0: f64, mu: f64, [bottom, top]: [f64; 2], radius: f64, t_max: f64) -> Vec<Interval> {
     let Some(outer) = shell_roots(h0, mu, top, radius) else {
@@ -142,6 +173,37 @@ mod tests {
             }
         }
         assert!(inside > 10_000, "only {inside} points lay inside");
+    }
+
+    /// Asks of points all over the disc whether a ray to them meets the ground.
+    #[test]
+    fn the_visible_sun_is_the_part_of_its_disc_over_the_ground() {
+        for size in [0.005, 0.0093, 0.06] {
+            for h in [0.0, 2.0, 1500.0, 12_000.0, 4e5] {
+                let dip = (PLANET_RADIUS / (PLANET_RADIUS + h)).acos();
+                for k in -12..=12 {
+                    // The middle's zenith angle: from wholly hidden to wholly in sight.
+                    let zenith = 0.5 * PI + dip - 0.05 * f64::from(k) * size;
+                    let (sine, cosine) = zenith.sin_cos();
+                    let (middle, over) = (DVec3::new(sine, cosine, 0.0), DVec3::new(-cosine, sine, 0.0));
+                    let points = 40_000;
+                    let seen = (0..points).filter(|k| {
+                        // Evenly over the disc, a golden angle apart.
+                        let r = 0.5 * size * ((f64::from(*k) + 0.5) / f64::from(points)).sqrt();
+                        let (across, up) = (2.399_963_23 * f64::from(*k)).sin_cos();
+                        let ray = (middle + r * (up * over + across * DVec3::Z)).normalize();
+                        ground_distance(h, ray.y, PLANET_RADIUS).is_none()
+                    });
+                    let (share, found) =
+                        (seen.count() as f64 / f64::from(points), visible_sun(h, cosine, size, PLANET_RADIUS));
+                    assert!((found - share).abs() < 5e-3, "size {size}, from {h} m, {k}: {found}, not {share}");
+                }
+            }
+        }
+        // Shares of 0 and 1 are exact, below the sea too.
+        let seen = [0.02_f64, -0.02].map(|mu| visible_sun(-50.0, mu, 0.0093, PLANET_RADIUS));
+        assert_eq!(seen, [1.0, 0.0]);
+        assert_eq!([f32::NAN, -1.0, f32::INFINITY, 0.0093].map(disc_size), [0.0, 0.0, 0.0, 0.0093]);
     }
 
     #[test]

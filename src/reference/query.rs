@@ -8,7 +8,7 @@ pub use super::texture_set::{CloudTextureSet, LayerTextureSet};
 use super::{
     field::{LocalModel, Medium},
     integrate,
-    planet::{Interval, Planet, ground_distance, layer_intervals},
+    planet::{Interval, Planet, ground_distance, layer_intervals, visible_sun},
     quadrature::{self, Accuracy},
 };
 use crate::{
@@ -39,6 +39,8 @@ pub struct CloudSky {
     textures: CloudTextureSet,
     planets: Arc<[Planet]>,
     sun: Option<DVec3>,
+    /// Angular diameter of the sun (rad).
+    sun_size: f64,
     seconds: f64,
 }
 
@@ -57,6 +59,7 @@ impl CloudSky {
             textures,
             planets,
             sun: None,
+            sun_size: 0.0,
             seconds: 0.0,
         })
     }
@@ -104,6 +107,13 @@ impl CloudSky {
         Self { sun: direction.and_then(DVec3::try_normalize), ..self }
     }
 
+    /// The same sky with a sun of this angular diameter (rad): its disc sinks below the horizon bit by bit. 0, as
+    /// [`new`](Self::new) has it, is a point.
+    #[must_use]
+    pub fn with_sun_size(self, diameter: f64) -> Self {
+        Self { sun_size: diameter, ..self }
+    }
+
     /// The same sky at another cloud time (s).
     #[must_use]
     pub fn at(self, seconds: f64) -> Self {
@@ -133,6 +143,11 @@ impl CloudSky {
     /// Direction to the sun, the scene's brightest `DirectionalLight`.
     pub fn sun(&self) -> Option<DVec3> {
         self.sun
+    }
+
+    /// Angular diameter of the sun (rad): that of the light's `SunDisk`, the Earth's sun's where it has none.
+    pub fn sun_size(&self) -> f64 {
+        self.sun_size
     }
 
     /// Density at `p` at cloud time `t` (s), the sum of all layers', rain included: 0 in clear air. About 1 µs, and as much
@@ -173,21 +188,33 @@ impl CloudSky {
     }
 
     /// Share of direct sunlight that reaches `p` through the clouds now: 1 in clear air, 0 where the planet or thick
-    /// cloud hides the sun, or there is none. The sun is the scene's brightest `DirectionalLight`, taken as a point. About
+    /// cloud hides the sun, or there is none. The sun is the scene's brightest `DirectionalLight`. The horizon, lower the
+    /// higher `p` lies, covers its disc bit by bit ([`visible_sun`]); cloud dims it as it does the disc's middle. About
     /// 0.1 ms.
     pub fn sun_visibility(&self, p: impl Into<DVec3>) -> f64 {
-        self.sun.map_or(0.0, |direction| self.visibility_towards(p, direction))
+        let p = p.into();
+        let seen = |h0: f64, mu: f64, radius: f64| visible_sun(h0, mu, self.sun_size, radius);
+        self.sun.map_or(0.0, |direction| self.light_from(p, direction, seen))
     }
 
-    /// As [`sun_visibility`](Self::sun_visibility), for a light infinitely far away in any direction.
+    /// As [`sun_visibility`](Self::sun_visibility), for a point of light infinitely far away in any direction.
     pub fn visibility_towards(&self, p: impl Into<DVec3>, direction: impl Into<DVec3>) -> f64 {
-        let (p, direction) = (p.into(), direction.into());
+        // As in the renderer: what is below sea level sees out, but nothing below the horizontal.
+        let is_hidden =
+            |h0: f64, mu: f64, radius| if h0 < 0.0 { mu < 0.0 } else { ground_distance(h0, mu, radius).is_some() };
+        self.light_from(p.into(), direction.into(), |h0, mu, radius| if is_hidden(h0, mu, radius) { 0.0 } else { 1.0 })
+    }
+
+    /// Share of a light infinitely far away that reaches `p`: the share `seen` past the planet, from the altitude of `p`,
+    /// the cosine between up and the light and the planet's radius, times what the clouds let through.
+    fn light_from(&self, p: DVec3, direction: DVec3, seen: impl Fn(f64, f64, f64) -> f64) -> f64 {
         let Some(model) = self.seen_from(p, self.seconds) else { return 1.0 };
         let Some(up) = model.local_direction(direction).try_normalize() else { return 1.0 };
-        let h0 = model.eye_altitude();
-        // As in the renderer: what is below sea level sees out, but nothing below the horizontal.
-        let hidden = if h0 < 0.0 { up.y < 0.0 } else { ground_distance(h0, up.y, model.radius()).is_some() };
-        if hidden { 0.0 } else { integrate::transmittance(self.depth(p, direction, f64::INFINITY, OPAQUE)) }
+        let seen = seen(model.eye_altitude(), up.y, model.radius());
+        if seen <= 0.0 {
+            return 0.0;
+        }
+        seen * integrate::transmittance(self.depth(p, direction, f64::INFINITY, OPAQUE))
     }
 
     /// The model in the frame below `eye`, at cloud time `t`.

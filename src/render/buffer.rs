@@ -37,10 +37,10 @@ impl CloudBuffer {
 /// pixel of the view, from its top left; pixels past the image's or the view's edge are left alone. Costs one full-size
 /// pass. Make the image with [`CloudDepth::image`].
 ///
-/// A material binds it as any other texture and asks the module `fade` how much of the cloud is before a fragment:
+/// A material binds it as any other texture and asks `cloud_fade` how much of the cloud is before a fragment:
 /// ```wgsl
 /// import bevy_pbr::render::{forward_io::VertexOutput, mesh_view_bindings::view};
-/// import bevy_cumulus::render::composite::fade::cloud_fade;
+/// import bevy_cumulus::cloud_fade;
 ///
 /// let pixel = vec2<i32>(mesh.position.xy - view.viewport.xy);
 /// let distance = length(mesh.world_position.xyz - view.world_position);

@@ -90,9 +90,15 @@ impl FrameUniform {
         self.limits.z
     }
 
+    /// All that accumulating frames asks for, and nothing else.
+    pub fn of_window(size: UVec2, index: u32, layers: UVec4) -> Self {
+        Self { size: UVec4::new(size.x, size.y, 1, index & 255), layers, ..default() }
+    }
+
     pub fn new(input: &FrameInput) -> Self {
         let FrameInput { space, sun, quality, lighting, phases, window, viewport, .. } = input;
         let local_from_world = space.local_from_world.as_quat();
+        let local_sun = local_from_world * sun.direction;
         let size = marched_size(*viewport, quality);
         let reach = reach(quality, lighting, space);
         let [peak_share, peak_asymmetry] = phases.peaks(lighting, input.octaves);
@@ -100,7 +106,7 @@ impl FrameUniform {
         Self {
             view_from_clip: input.clip_from_view.inverse(),
             local_from_view: Mat4::from_quat(local_from_world * input.world_from_view),
-            sun_direction: (local_from_world * sun.direction).extend(sun.angular_size),
+            sun_direction: local_sun.extend(sun.angular_size),
             sun_illuminance: (sun.illuminance * lighting.sun_strength).extend(0.0),
             phase_params: phases.params(),
             phase_kinds: phases.kinds(),
@@ -118,7 +124,7 @@ impl FrameUniform {
             ambient: (lighting.ambient_tint * lighting.ambient_strength).extend(lighting.powder),
             ground_albedo: lighting.ground_albedo.extend(lighting.ambient_desaturation),
             // smoothstep is undefined where both edges meet.
-            sky_fallback: lighting.sky_fallback.extend(lighting.fade_start.min(0.999)),
+            sky_fallback: sky_radiance(lighting, sun, local_sun.y).extend(lighting.fade_start.min(0.999)),
             steps: Vec4::new(quality.step, quality.step_growth, quality.light_step, quality.light_growth),
             limits: Vec4::new(
                 quality.transmittance_stop,
@@ -155,6 +161,18 @@ impl FrameUniform {
             debug: UVec4::new(input.debug.shader_mode(), window.index, quality.seed, phases.is_coloured().into()),
         }
     }
+}
+
+/// Radiance of the sky where the scene has no `Atmosphere` (cd/m²), `sine` being that of the sun's elevation.
+///
+/// A clear sky loses all but a 200th of its light from sunset to the end of civil twilight [AMS, civil twilight]; here it
+/// loses all. A smoothstep, cubed so that most of the light goes while the sun sets.
+fn sky_radiance(lighting: &CloudLighting, sun: &Sun, sine: f32) -> Vec3 {
+    /// Elevations of the sun (degrees): none of the light up to the first, all of it from the second.
+    const TWILIGHT: [f32; 2] = [-6.0, 3.0];
+    let elevation = sine.clamp(-1.0, 1.0).asin().to_degrees();
+    let t = ((elevation - TWILIGHT[0]) / (TWILIGHT[1] - TWILIGHT[0])).clamp(0.0, 1.0);
+    lighting.sky_fallback * sun.illuminance * (t * t * (3.0 - 2.0 * t)).powi(3)
 }
 
 /// How far low clouds are shown (m). From the ground `max_distance`; higher up it grows, so that from an airliner the lowest

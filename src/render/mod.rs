@@ -37,7 +37,8 @@ pub use buffer::{CloudBuffer, CloudDepth, CloudFrame, CloudNoise};
 pub use counts::CloudCounts;
 pub(crate) use frame::FrameUniform;
 pub(crate) use phase_slots::{PHASE_SLOTS, phase_tables_layout};
-pub(crate) use pipelines::depth_layout;
+pub(crate) use pipelines::{CloudPipelines, depth_layout};
+pub(crate) use reproject::HeldUniform;
 pub use status::CloudStatus;
 pub(crate) use status::StatusFlags;
 

@@ -308,6 +308,10 @@ impl CloudPipelines {
         made
     }
 
+    pub fn accumulate_shader(&self) -> Handle<Shader> {
+        self.shaders[2].clone()
+    }
+
     /// Blends the picture over what is drawn already.
     fn draw_pipeline(&self, variant: Variant) -> RenderPipelineDescriptor {
         let premultiplied = BlendState {

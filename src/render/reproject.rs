@@ -136,6 +136,11 @@ pub(crate) struct HeldUniform {
 pub(crate) type HeldFrame<'a> = (&'a Pose, Vec3);
 
 impl HeldUniform {
+    /// Of a camera that stands still: every held frame has today's exposure.
+    pub fn still() -> Self {
+        Self { terms: [Vec4::W; MOST_HELD], ..default() }
+    }
+
     /// For a frame with this pose after `held` ones, the latest first. `march` says which texels are marched.
     pub fn new<'a>(
         now: &Pose,

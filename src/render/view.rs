@@ -30,7 +30,7 @@ use super::{
 use crate::{
     model::{MAX_ZONES, ModelSettings, ModelUniform, TangentFrame, TexelSizes, decks},
     phases::ReadyTables,
-    reference::planet::Planet,
+    reference::planet::{Planet, disc_size},
     settings::{
         CloudDebugView, CloudLayers, CloudLighting, CloudModel, CloudOrder, CloudPhase, CloudQuality, CloudSettings,
         CloudView, CloudWeather, GoodPhases, GoodSettings, LightMix, Validate,
@@ -208,7 +208,7 @@ fn brightest_sun(lights: &Query<&ExtractedDirectionalLight>) -> Sun {
         .map(|light| Sun {
             direction: light.transform.back().as_vec3(),
             illuminance: light.color.to_vec3() * light.illuminance,
-            angular_size: light.sun_disk_angular_size,
+            angular_size: disc_size(light.sun_disk_angular_size),
         })
         .filter(|sun| sun.direction.is_finite() && sun.illuminance.is_finite())
         .max_by(|a, b| a.illuminance.element_sum().total_cmp(&b.illuminance.element_sum()))

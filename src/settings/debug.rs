@@ -11,7 +11,7 @@ use super::{CloudLighting, CloudModel, CloudQuality, PhaseFunction, TemporalMode
 /// that say "shader" have a march of their own, compiled when first asked for; until then the finished clouds stay. The
 /// others only change settings of this view for as long as they are on.
 ///
-/// The maps ask the model for a function `debug_value` (see `model/medium.wesl`). A [`ModelShader`](crate::ModelShader)
+/// The maps ask the model for a function `debug_value` (see `docs/shaders.md`). A [`ModelShader`](crate::ModelShader)
 /// without it gets one error in the log; the finished clouds stay, and `CloudStatus::is_ready` is false until another
 /// view is chosen.
 #[derive(Reflect, Serialize, Deserialize, Clone, Copy, PartialEq, Eq, Hash, Debug, Default)]

@@ -53,8 +53,8 @@ pub struct CloudLayer {
     pub kind: LayerKind,
     /// The map, made from numbers. Changing one makes it again in the background; the old one stays until then.
     pub map: WeatherRecipe,
-    /// Path of an image asset in the recipe's place: PNG, KTX2 (not compressed) or, with the feature `exr`, which is on by
-    /// default, EXR. It tiles over `map.scale`. Hot-reloaded. Default none.
+    /// Path of an image asset in the recipe's place: PNG, EXR (with the feature `exr`, on by default), or what else Bevy is
+    /// built to load, such as KTX2 (not compressed). It tiles over `map.scale`. Hot-reloaded. Default none.
     pub map_file: String,
     /// An image in the recipe's place, and in the file's: set in code. Default none.
     #[serde(skip)]

@@ -62,7 +62,8 @@ pub struct CloudLighting {
     /// default, 28 % (all within 1.6° of the sun) with 30. Default 500.
     #[reflect(@0.1..=100_000.0_f32)]
     pub phase_limit: f32,
-    /// Factor on the sun's illuminance. Default 1: as the scene's light says.
+    /// Factor on the sun's own light, on clouds and on the ground below; the sky keeps its light. Default 1: as the
+    /// scene's light says.
     #[reflect(@0.0..=100.0_f32)]
     pub sun_strength: f32,
     /// Factor on the ambient light: sky and ground around the cloud, and what of them shines through where it is thin.
@@ -76,8 +77,10 @@ pub struct CloudLighting {
     /// 0 none, 1 all). Default 0.
     #[reflect(@0.0..=1.0_f32)]
     pub ambient_desaturation: f32,
-    /// Mean radiance of the sky where the scene has no `Atmosphere`, as a share of the sun's illuminance
-    /// (1/sr, linear RGB). Default (0.026, 0.037, 0.055): a clear day's.
+    /// Mean radiance of the sky where the scene has no `Atmosphere`, as a share of the illuminance of the scene's sun
+    /// (1/sr, linear RGB). All of it while the sun stands 3° or more above the horizon of the ground below the camera; less
+    /// the lower it is, 41 % at 0° and 2 % at −3°, and none from −6° on (the cube of a smoothstep over the elevation).
+    /// Default (0.026, 0.037, 0.055): a clear day's.
     #[reflect(@0.0..=1.0_f32)]
     pub sky_fallback: Vec3,
     /// Albedo of the ground below, linear RGB: its bounce lights the bases. Default (0.2, 0.2, 0.18).

@@ -157,7 +157,7 @@ impl CloudTextureViews {
 
 /// All GPU state of the bake. Made anew with each device, so that a lost one is baked for again.
 #[derive(Resource)]
-pub(super) struct Bakery {
+pub(crate) struct Bakery {
     bound: [Option<Bound>; CloudTextureSlot::COUNT],
     job: Option<Job>,
     /// Work of the bake under way when it was largest; 0 when there is none.
@@ -167,7 +167,7 @@ pub(super) struct Bakery {
 
 impl Bakery {
     /// The texture that a slot shows.
-    pub(super) fn texture(&self, slot: CloudTextureSlot) -> Option<&Texture> {
+    pub(crate) fn texture(&self, slot: CloudTextureSlot) -> Option<&Texture> {
         self.bound[slot as usize].as_ref().map(|bound| &bound.texture)
     }
 

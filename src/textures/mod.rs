@@ -16,7 +16,6 @@
 mod bake;
 pub mod blue_noise;
 #[doc(hidden)]
-pub mod capture;
 pub(crate) mod cpu_copies;
 mod job;
 pub mod n_rooks;
@@ -40,11 +39,12 @@ use bevy::{
     shader::load_shader_library,
 };
 
-pub(crate) use bake::CloudTextureViews;
+pub(crate) use bake::{Bakery, CloudTextureViews};
 pub use bake::{GPU_FRAMES, TEXEL_OCTAVES_PER_FRAME};
 pub use profile::{CUMULUS_PROFILE, GRADIENT_SIZE, STRATUS_PROFILE, vertical_profile};
 pub use progress::CloudTextureStatus;
 pub use slots::{CloudTextureError, CloudTextureFault, CloudTextureSlot};
+pub(crate) use texel::decoder;
 
 /// Where textures change hands in `Render`: what reads them comes after.
 #[derive(SystemSet, Clone, PartialEq, Eq, Hash, Debug)]

@@ -1,9 +1,10 @@
 //! Texels as numbers.
 
 use bevy::render::render_resource::TextureFormat;
+use half::f16;
 
 /// Reads one texel; channels that the format lacks are 0, alpha 1. `None` for formats that no slot takes.
-pub(super) fn decoder(format: TextureFormat) -> Option<fn(&[u8]) -> [f32; 4]> {
+pub(crate) fn decoder(format: TextureFormat) -> Option<fn(&[u8]) -> [f32; 4]> {
     match format {
         TextureFormat::R8Unorm | TextureFormat::Rg8Unorm | TextureFormat::Rgba8Unorm => Some(bytes),
         TextureFormat::R16Float | TextureFormat::Rg16Float | TextureFormat::Rgba16Float => Some(halves),
@@ -22,14 +23,7 @@ fn bytes(texel: &[u8]) -> [f32; 4] {
 fn halves(texel: &[u8]) -> [f32; 4] {
     let mut channels = [0.0, 0.0, 0.0, 1.0];
     for (channel, pair) in channels.iter_mut().zip(texel.chunks_exact(2)) {
-        *channel = half(u16::from_le_bytes([pair[0], pair[1]]));
+        *channel = f16::from_le_bytes([pair[0], pair[1]]).to_f32();
     }
     channels
-}
-
-/// An IEEE 754 half as a float. Infinities and NaN are not expected in these textures.
-fn half(bits: u16) -> f32 {
-    let sign = if bits >> 15 == 1 { -1.0 } else { 1.0 };
-    let (exponent, fraction) = (i32::from(bits >> 10 & 31), f32::from(bits & 1023) / 1024.0);
-    sign * if exponent == 0 { fraction * 2f32.powi(-14) } else { (1.0 + fraction) * 2f32.powi(exponent - 15) }
 }

@@ -169,8 +169,8 @@ pub(super) fn picture_channel(image: &Image) -> Result<(UVec2, Vec<f32>), Weathe
 }
 
 impl WeatherMap {
-    /// Takes a map from a picture, as Bevy loads PNG, KTX2 (not compressed), EXR or HDR files: the first mip level of one to
-    /// four channels of 8 or 16 bits, or of floats from 0 to 1.
+    /// Takes a map from a picture, as Bevy loads PNG, KTX2 (not compressed), EXR or HDR files where its features for them are
+    /// on: the first mip level of one to four channels of 8 or 16 bits, or of floats from 0 to 1.
     ///
     /// Numbers are taken as they were painted, whether or not the picture is marked as sRGB. Where height or base is missing,
     /// cloud has full height and its base lies at the bottom; that holds too for a picture that is grey all over, which is

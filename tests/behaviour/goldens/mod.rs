@@ -1,0 +1,4 @@
+//! Pictures as they were when last approved.
+
+mod presets;
+mod scenes;

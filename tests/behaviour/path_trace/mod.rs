@@ -1,0 +1,3 @@
+//! The path tracer against answers from outside.
+
+mod closed_forms;

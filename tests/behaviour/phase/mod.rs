@@ -1,0 +1,5 @@
+//! Phase functions, and tables of them.
+
+mod functions;
+mod slots;
+mod tables;

@@ -1,0 +1,5 @@
+//! Preset files: loading, following, keys.
+
+mod files;
+mod frozen;
+mod keys;

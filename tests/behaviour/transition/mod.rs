@@ -1,0 +1,3 @@
+//! From one sky to another over time.
+
+mod weather_changes;

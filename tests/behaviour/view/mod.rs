@@ -1,0 +1,4 @@
+//! Cameras: none, one or many.
+
+mod cameras;
+mod many_cameras;
