@@ -3,8 +3,8 @@
 /// What the rays of one frame did, added up: how many steps they took with
 /// [`CloudDebugView::StepCount`](crate::CloudDebugView::StepCount), and so with the other count views.
 ///
-/// Counts are whole numbers and repeat from run to run, on any device, where times do not: of the same view, settings and
-/// frame of the history they are the same to the digit.
+/// Counts are whole numbers and repeat from run to run, where times do not: of the same view, settings and frame of the
+/// history they are the same to the digit on one device and driver. Another may round the odd ray into one step more.
 #[derive(Clone, Copy, PartialEq, Eq, Debug, Default)]
 pub struct CloudCounts {
     /// Rays marched in this frame.

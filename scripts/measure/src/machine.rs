@@ -62,7 +62,7 @@ impl Machine {
             return String::new();
         }
         format!(
-            "This is a software driver: times say little about a GPU, ratios more, and counts are the same on both.{}",
+            "This is a software driver: times say little about a GPU, ratios more, and counts most.{}",
             self.about_load()
         )
     }

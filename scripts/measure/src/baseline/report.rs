@@ -22,15 +22,19 @@ const TIMES: &str = "
 
 const COUNTS: &str = "
 Of one frame: steps of the rays, media that they sampled (towards the light too), and textures that they read; a ray's mean,
-and the ratio of what all rays together count. Counts repeat to the digit from run to run.
+and the ratio of what all rays together count. Counts repeat to the digit from run to run of one driver.
 
 ";
 
 pub fn write(results: &Results) -> String {
     let machine = &results.machine;
-    let rounds = if results.rounds == 1 { "round".to_owned() } else { format!("{} rounds", results.rounds) };
+    let (rounds, about) = match results.rounds {
+        0 => ("counts alone".to_owned(), String::new()),
+        1 => ("one round".to_owned(), format!(" {}", machine.about_medians())),
+        rounds => (format!("{rounds} rounds"), format!(" {}", machine.about_medians())),
+    };
     let mut text = format!(
-        "{HEAD}\nMeasured {} at commit {} beside {COMMIT} on {}, {}: pictures of {}, {rounds}, {} min {} s in all. {}\n",
+        "{HEAD}\nMeasured {} at commit {} beside {COMMIT} on {}, {}: pictures of {}, {rounds}, {} min {} s in all.{about}\n",
         machine.date,
         machine.commit,
         machine.adapter,
@@ -38,7 +42,6 @@ pub fn write(results: &Results) -> String {
         results.size,
         results.seconds / 60,
         results.seconds % 60,
-        machine.about_medians(),
     );
     if results.rounds > 0 {
         text += &format!("\n## Times\n{TIMES}{}", times(&results.scenes));
