@@ -270,8 +270,9 @@ fn the_sky_darkens_with_the_sun(stage: &mut Stage) {
 }
 
 fn the_ground_is_lit_by_the_part_of_the_sun_over_its_horizon(stage: &mut Stage) {
-    // Only the march can leave out the sun's own light on the cloud.
-    stage.light(CloudLighting { octaves: 0, diffusion: 0.0, sky_fallback: Vec3::ZERO, fade_start: 1.0, ..default() });
+    // Only the march can leave out the sun's own light on the cloud. Scattered evenly: droplets turn little of it down.
+    let lighting = CloudLighting { sun_strength: 1.0, sky_fallback: Vec3::ZERO, ..skylight() };
+    stage.light(CloudLighting { octaves: 0, diffusion: 0.0, ground_albedo: Vec3::splat(0.2), ..lighting });
     let mut lit_at = |elevation: f64| {
         stage.set_sun(elevation);
         stage.marched(BELOW)

@@ -19,8 +19,6 @@ use crate::support::{
 
 fn show(app: &mut App, view: &View, debug: CloudDebugView) {
     app.world_mut().get_mut::<CloudView>(view.camera).expect("it shows clouds").debug = debug;
-    // From the next frame on it counts whether this view's march is there.
-    run_updates(app, 1);
     until_drawn(app);
     run_updates(app, 12);
 }
