@@ -37,7 +37,7 @@
 //! | model | the shader module that says where cloud is; [`ModelShader`] replaces it |
 //! | render | the passes of each camera with a [`CloudView`] |
 //! | query | [`CloudField`] answers on the CPU: density, visibility, sunlight |
-//! | [`reference`] | the renderer's maths on the CPU, and what the path tracer is tested against |
+//! | [`mod@reference`] | the renderer's maths on the CPU, and what the path tracer is tested against |
 //!
 //! The plugin spawns nothing: the sun is the scene's brightest `DirectionalLight`, the sky its `Atmosphere`.
 //!
