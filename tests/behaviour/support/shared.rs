@@ -7,6 +7,7 @@
 use std::{
     collections::HashMap,
     ops::{Deref, DerefMut},
+    panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     sync::{Condvar, LazyLock, Mutex, MutexGuard, PoisonError},
     time::Duration,
 };
@@ -102,15 +103,26 @@ impl DerefMut for SharedApp {
 
 impl Drop for SharedApp {
     fn drop(&mut self) {
-        let sub_apps = self.is_good_for_others().then(|| {
-            clear(&mut self.app, &self.textures);
-            std::mem::take(self.app.sub_apps_mut())
+        let cleared = self.is_good_for_others().then(|| {
+            catch_unwind(AssertUnwindSafe(|| {
+                clear(&mut self.app, &self.textures);
+                std::mem::take(self.app.sub_apps_mut())
+            }))
         });
+        // Whatever went wrong, others must not wait for this one.
+        let (idle, failure) = match cleared {
+            Some(Ok(sub_apps)) => (Some(sub_apps), None),
+            Some(Err(failure)) => (None, Some(failure)),
+            None => (None, None),
+        };
         if let Some(of_kind) = kinds().get_mut(self.kind) {
             of_kind.taken -= 1;
-            of_kind.idle.extend(sub_apps);
+            of_kind.idle.extend(idle);
         }
         GIVEN_BACK.notify_all();
+        if let Some(failure) = failure {
+            resume_unwind(failure);
+        }
     }
 }
 
