@@ -1,13 +1,12 @@
 //! Weather-map layers: their bounds, their sum, their place in time, and what is wrong with them.
 
 use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::testing::model_bindings;
 use bevy_cumulus::{prelude::*, settings::LayerKind};
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use crate::robustness::bad_input::refuses;
 use crate::support::{
-    app::{View, cloud_pixels, clouds_app, spawn_sun, until_drawn},
+    app::{View, cloud_pixels, clouds_app, is_baked, spawn_sun, until_drawn},
     density::{Answer, Question, ask, at, model_app, question},
     gpu::{run_until, run_updates, times_logged},
     scene::{exact, settle, spawn_linear, steps},
@@ -83,10 +82,7 @@ fn kinds() -> Vec<(&'static str, Vec<CloudLayer>)> {
 pub fn show(app: &mut App, layers: &[CloudLayer]) -> CloudModel {
     app.insert_resource(CloudLayers(layers.to_vec()));
     run_updates(app, 2);
-    run_until(app, "the layers' maps", 600, |app| {
-        let status = app.world().resource::<bevy_cumulus::textures::CloudTextureStatus>();
-        !status.baking && model_bindings(app, DVec3::ZERO).is_ok()
-    });
+    run_until(app, "the layers' maps", 600, |app| is_baked(app));
     // Where questions are asked: around all of the layers.
     let bottom = layers.iter().map(CloudLayer::bottom).fold(f32::INFINITY, f32::min);
     let top = layers.iter().map(CloudLayer::top).fold(f32::NEG_INFINITY, f32::max);

@@ -5,7 +5,7 @@ use bevy_cumulus::testing::model_bindings;
 use bevy_cumulus::{prelude::*, settings::Validate, textures::CloudTextureStatus};
 
 use crate::support::{
-    app::{Sky, cloud_pixels, clouds_app, spawn_sun, spawn_view, until_drawn},
+    app::{Sky, cloud_pixels, clouds_app, is_baked, spawn_sun, spawn_view, until_drawn},
     gpu::{run_compute_with, run_until, run_updates, times_logged},
     shared::SharedApp,
 };
@@ -78,9 +78,7 @@ fn model_app(layered: bool) -> SharedApp {
     // Layers are there once their maps are.
     for _ in 0..2 {
         run_updates(&mut app, 4);
-        run_until(&mut app, "the textures are there", 900, |app| {
-            !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
-        });
+        run_until(&mut app, "the textures are there", 900, |app| is_baked(app));
     }
     app
 }

@@ -136,15 +136,17 @@ pub fn until_drawn(app: &mut App) {
     });
 }
 
+/// Whether the model's textures are baked, and its layers' maps made.
+pub fn is_baked(app: &App) -> bool {
+    !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
+}
+
 /// Runs frames until the textures that are asked for now are baked.
 pub fn until_baked(app: &mut App) {
-    let is_baked = |app: &mut App| {
-        !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
-    };
-    run_until(app, "the textures are baked", 600, is_baked);
+    run_until(app, "the textures are baked", 600, |app| is_baked(app));
     // Those that small sizes ask for are begun after the first ones.
     run_updates(app, 3);
-    run_until(app, "the textures are baked", 600, is_baked);
+    run_until(app, "the textures are baked", 600, |app| is_baked(app));
 }
 
 /// The resolved clouds of the last frame, row by row from the top left: radiance (cd/m²) and transmittance.

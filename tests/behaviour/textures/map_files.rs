@@ -1,12 +1,11 @@
 //! Layers' maps from files of each kind, hot-reloaded, and by channel.
 
-use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::testing::model_bindings;
-use bevy_cumulus::{prelude::*, settings::MapChannels, textures::CloudTextureStatus};
+use bevy::prelude::*;
+use bevy_cumulus::{prelude::*, settings::MapChannels};
 use image::{ImageFormat, Rgba32FImage, RgbaImage};
 
 use crate::support::{
-    app::clouds_app_in,
+    app::{clouds_app_in, is_baked},
     density::{ask, at},
     gpu::{run_until, run_updates, times_logged},
     program::Folder,
@@ -18,9 +17,7 @@ use crate::{
 
 fn app(folder: &Folder) -> App {
     let mut app = clouds_app_in(folder);
-    run_until(&mut app, "the textures are baked", 600, |app| {
-        !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
-    });
+    run_until(&mut app, "the textures are baked", 600, |app| is_baked(app));
     app
 }
 

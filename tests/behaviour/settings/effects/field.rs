@@ -1,12 +1,12 @@
 //! The field of cloud as the shader has it, asked at points without a camera.
 
 use bevy::{math::DVec3, prelude::*};
-use bevy_cumulus::{testing::model_bindings, textures::CloudTextureStatus};
+use bevy_cumulus::testing::model_bindings;
 use rand::{Rng, SeedableRng, rngs::StdRng};
 
 use super::scene::{Images, Scene};
 use crate::support::{
-    app::clouds_app_in,
+    app::{clouds_app_in, is_baked},
     gpu::{run_compute_with, run_until, run_updates},
     program::Folder,
 };
@@ -65,17 +65,13 @@ pub struct FieldLab {
     _files: Folder,
 }
 
-fn is_there(app: &App) -> bool {
-    !app.world().resource::<CloudTextureStatus>().baking && model_bindings(app, DVec3::ZERO).is_ok()
-}
-
 impl FieldLab {
     pub fn new() -> Self {
         let files = Folder::new();
         let white = image::RgbaImage::from_pixel(8, 8, image::Rgba([255, 255, 255, 255]));
         white.save(files.join("white.png")).expect("the folder can be written");
         let mut app = clouds_app_in(&files);
-        run_until(&mut app, "the textures are baked", 600, |app| is_there(app));
+        run_until(&mut app, "the textures are baked", 600, |app| is_baked(app));
         Self { app, images: Images::default(), _files: files }
     }
 
@@ -83,7 +79,7 @@ impl FieldLab {
     pub fn show(&mut self, scene: &Scene) {
         scene.apply(&mut self.app, &mut self.images);
         run_updates(&mut self.app, 3);
-        run_until(&mut self.app, "textures and maps", 900, |app| is_there(app));
+        run_until(&mut self.app, "textures and maps", 900, |app| is_baked(app));
         // What went by meanwhile does not count.
         scene.apply(&mut self.app, &mut self.images);
     }
